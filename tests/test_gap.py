@@ -284,7 +284,7 @@ def test_what_a_trial_without_robot_angles_costs_is_said(tmp_path: Path, capsys:
     assert cli.main(["gap", str(tmp_path / "data"), "--quick", "--json", str(tmp_path / "gap.json")]) == 0
     [line] = json.loads((tmp_path / "gap.json").read_text(encoding="utf-8"))["warnings"]
     assert line.startswith(
-        "no robot angles in slow_2.csv: so all trials are compared by joint torques in measured motion, and errors of the contact, "
+        "no robot angles in slow_2.csv: so all trials are compared by joint torques in measured motion; leave such trials out, "
     )
     assert line in capsys.readouterr().err
     none = data.replace(trials=tuple(dataclasses.replace(t, robot_q=None) for t in data.trials))

@@ -1,6 +1,7 @@
 //! All questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
 
 use arm_core::effect::{Effect, Kind, Local, MAX_STATES, Nature, Part, Place, Values};
+use arm_core::{Contact, Setup, models};
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
@@ -168,16 +169,30 @@ fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<u
     // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them, nor of what a
     // weight or an inertia could as well be.
     let swings_freely = session.swings_freely();
+    // Torques of a contact are told with the lengths: where no path of a robot tells these, a wrong one looks like a wrong weight.
+    let lengths_tell = led || !session.reads_contact();
     match kind.info().place {
+        Place::Segment if !lengths_tell && lengthens(kind) => 0..0,
         Place::Segment | Place::Hand | Place::Frame | Place::Base if swings_freely => 0..0,
         Place::Joint if swings_freely && holds_at_rest(kind) => 0..0,
         Place::Joint => usize::from(kind.crosses())..N,
         Place::Segment | Place::AngleSensor => 0..N,
         Place::Frame | Place::Base | Place::Hand => 0..1,
-        Place::ForceSensor if led => 0..2,
-        Place::Contact | Place::Sensors if led => 0..1,
+        Place::ForceSensor if session.reads_contact() => 0..2,
+        Place::Sensors if session.reads_contact() => 0..1,
+        Place::Contact if led => 0..1,
         Place::ForceSensor | Place::Contact | Place::Sensors => 0..0,
     }
+}
+
+/// Whether a kind changes the length of a segment.
+fn lengthens(kind: Kind) -> bool {
+    let mut setup = Setup::new(&models::mechanical_arm(), Contact::new([1.0; 2], [0.0; 2]));
+    let before = setup.segments[0].length;
+    let mut effect = Effect::<f64>::new(kind, 0);
+    effect.parameters[0] = 0.5;
+    effect.alter(&mut setup);
+    setup.segments[0].length != before
 }
 
 /// Whether a kind resists a joint that does not move yet: springs do, also those that fade, and rotors.

@@ -8,6 +8,7 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::GapError;
 use crate::data::noise::{Noise, Thinned, dot};
 use crate::data::prepared_session::PreparedSession;
+use crate::data::session::ComparisonMode;
 use crate::measurement_model::prediction::Channels;
 use crate::selection::fit::{Fitted, decided};
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -132,7 +133,15 @@ impl<const N: usize> PreparedSession<'_, N> {
             .iter()
             .map(|c| c.prior.map_or(f64::INFINITY, |(_, sd)| sd))
             .collect();
-        let mut noise = Noise::of(deviations, fitted, range, told)?;
+        // The torques of one force vary together. What they leave over between them, no noise of the force is in: it would count most, and
+        // there the noise of speeds makes all that resists too small.
+        let apart =
+            self.session.reads_contact() && self.session.comparison == ComparisonMode::Torque;
+        let of = |deviations: &[Thinned], taken: &[Thinned]| {
+            let noise = Noise::of(deviations, taken, range, told)?;
+            Ok::<_, GapError>(if apart { noise.apart() } else { noise })
+        };
+        let mut noise = of(deviations, fitted)?;
         for _ in 0..TURNS {
             if known.is_empty() {
                 break;
@@ -161,7 +170,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 add(deviation, columns, &solver.solve(&score));
                 taken.extend(solver.spread().iter().map(|shares| sum(columns, shares)));
             }
-            noise = Noise::of(&clean, &taken, range, told)?;
+            noise = of(&clean, &taken)?;
         }
         Ok(noise)
     }

@@ -168,6 +168,17 @@ impl Noise {
         })
     }
 
+    /// The same as if channels did not vary together.
+    pub fn apart(self) -> Self {
+        let channels = self.whiteners.len();
+        let mut correlation = vec![0.0; channels * channels];
+        (0..channels).for_each(|a| correlation[a * (channels + 1)] = 1.0);
+        Self {
+            mix: inverse_factor(&correlation, channels),
+            ..self
+        }
+    }
+
     /// Without repeats: white, as large as what is left, and larger by as much as it is correlated in time.
     ///
     /// An autoregression of what is left would take slow effects for noise.

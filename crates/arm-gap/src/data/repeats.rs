@@ -9,6 +9,9 @@ use crate::measurement_model::prediction::Course;
 /// Root mean square distance between the paths of two trials that are the same movement \[m, rad\].
 const SAME_PATH: f64 = 0.01;
 
+/// The same of the angles of an arm whose contact is compared by torques: a sensor may slip by some degrees within a trial \[rad\].
+const SAME_ANGLES: f64 = 0.1;
+
 /// Trials that repeat one movement: the group of each, and the longest trial of every group.
 pub fn groups<const N: usize>(
     trials: &[Trial<N>],
@@ -20,7 +23,7 @@ pub fn groups<const N: usize>(
         let found = references.iter().position(|&r| {
             trials[r].configuration == trial.configuration
                 && same_rate(trials[r].rate, trial.rate)
-                && courses[r].is_like(&courses[i], SAME_PATH)
+                && courses[r].is_like(&courses[i])
         });
         match found {
             Some(group) => {
@@ -45,7 +48,12 @@ pub fn same_rate(a: f64, b: f64) -> bool {
 
 impl<const N: usize> Course<N> {
     /// Whether another trial makes the same movement at the same times. One of both may have been broken off after half of the way.
-    fn is_like(&self, other: &Self, allowed: f64) -> bool {
+    fn is_like(&self, other: &Self) -> bool {
+        let allowed = if self.has_contact_readings() {
+            SAME_ANGLES
+        } else {
+            SAME_PATH
+        };
         let (mine, theirs) = (self.path(), other.path());
         let count = mine.len().min(theirs.len());
         let longer = if mine.len() > count { &mine } else { &theirs };

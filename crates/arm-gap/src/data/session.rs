@@ -76,6 +76,12 @@ impl<const N: usize> Session<N> {
         }
     }
 
+    /// Whether a contact alone moves the arm, and a sensor reads its force in every trial.
+    pub fn reads_contact(&self) -> bool {
+        let mut trials = self.trials.iter();
+        trials.all(|t| t.force_on_arm.is_some() && t.torque.is_none())
+    }
+
     /// Trials on which things are chosen and fitted.
     pub fn fit_trials(&self) -> Vec<usize> {
         (0..self.trials.len())
@@ -90,7 +96,7 @@ impl<const N: usize> Session<N> {
             let Some(promise) = kind.prior().promise else {
                 continue;
             };
-            if self.comparison == ComparisonMode::Torque && promise != Promise::AngleOffset {
+            if !self.reads_contact() && promise != Promise::AngleOffset {
                 continue;
             }
             let places = match kind.info().place {
@@ -232,15 +238,14 @@ impl<const N: usize> Session<N> {
             upper: f64::INFINITY,
             step: 0.25 * sd,
         };
-        match self.comparison {
-            ComparisonMode::Led if sd > 0.0 => vec![
-                placed(Target::Placement(0)),
-                placed(Target::Placement(1)),
-                placed(Target::Shift(0)),
-                placed(Target::Shift(1)),
-            ],
-            _ => Vec::new(),
+        if sd <= 0.0 || !self.reads_contact() {
+            return Vec::new();
         }
+        let mut list = [0, 1].map(|axis| placed(Target::Placement(axis))).to_vec();
+        if self.comparison == ComparisonMode::Led {
+            list.extend([0, 1].map(|axis| placed(Target::Shift(axis))));
+        }
+        list
     }
 
     /// Refuses what no comparison can be made of.

@@ -10,7 +10,8 @@ use arm_sim::{Drive, Experiment, Interpolation, Series, SimulationError, Start, 
 use crate::data::noise::dot;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course, STEPS, offsets, unbent};
+use crate::measurement_model::joint_torques::{offsets, unbent};
+use crate::measurement_model::prediction::{Channels, Course, STEPS};
 
 /// How long a start is fitted to, and how long a driven arm runs \[s\].
 const SPAN: f64 = 1.0;

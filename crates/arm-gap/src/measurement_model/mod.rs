@@ -2,7 +2,9 @@
 
 mod base_path;
 mod compared;
+mod contact_readings;
 pub mod hypothesis;
 pub mod in_trial;
+pub mod joint_torques;
 pub mod prediction;
 pub(crate) mod start;

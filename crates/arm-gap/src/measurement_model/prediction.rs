@@ -1,11 +1,11 @@
 //! What the channels would read if a hypothesis were true.
 
-use arm_core::effect::{
-    Effect, MAX_STATES, Motion, Place, advance_states, resisting_besides_dry, resisting_torque,
-};
-use arm_core::{Joints, Plane, Pose, Reading, inverse_dynamics, joint_force, static_torque};
+use arm_core::effect::{Effect, Motion, Place, resisting_besides_dry};
+use arm_core::{Joints, Plane, Pose, inverse_dynamics, joint_force, static_torque};
 use arm_ident::regression::kinematics::Kinematics;
-use arm_ident::regression::measured_motion::{is_quiet, low_pass, measured, relative_speed_noise};
+use arm_ident::regression::measured_motion::{
+    candidates_of_measured, is_quiet, low_pass, measured, relative_speed_noise,
+};
 use arm_ident::regression::trial::Trial;
 use arm_sim::{
     Coupling, Drive, Experiment, HandlePath, Recording, Sensors, Series, SimulationError, Start,
@@ -14,6 +14,7 @@ use arm_sim::{
 
 use crate::GapError;
 use crate::data::session::{ComparisonMode, Session};
+use crate::measurement_model::contact_readings::ContactReadings;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
@@ -50,7 +51,7 @@ pub struct Course<const N: usize> {
     /// What its samples weigh. Where that is less than one, forces are compared in the common band only: above it they hang on what the
     /// robot did between its samples.
     pub weight: f64,
-    times: Vec<f64>,
+    pub(super) times: Vec<f64>,
     pub(super) handle: Vec<Plane<f64>>,
     /// How far the base is from its place \[m\], where its path was measured and drives a simulation.
     pub(crate) base: Option<Series<2>>,
@@ -59,7 +60,9 @@ pub struct Course<const N: usize> {
     /// Angles and force on the arm that are measured at the start.
     pub(crate) start: Joints<f64, N>,
     pub(crate) start_force: Plane<f64>,
-    motion: Option<Kinematics<N>>,
+    pub(super) motion: Option<Kinematics<N>>,
+    /// What the sensors read of hand and contact, where torques are compared that the contact exerts.
+    pub(super) contact: Option<ContactReadings<N>>,
 }
 
 impl<const N: usize> Course<N> {
@@ -92,6 +95,11 @@ impl<const N: usize> Course<N> {
         }
     }
 
+    /// Whether torques are compared that a contact exerts.
+    pub fn has_contact_readings(&self) -> bool {
+        self.contact.is_some()
+    }
+
     /// The measured joint motion, where torques are compared.
     pub fn motion(&self) -> Option<&Kinematics<N>> {
         self.motion.as_ref()
@@ -119,7 +127,7 @@ impl<const N: usize> Session<N> {
     /// [`GapError::Numerics`] for a trial too short for the filters.
     pub fn course(&self, number: usize) -> Result<Course<N>, GapError> {
         let trial = &self.trials[number];
-        let band = BAND.min(0.2 * trial.rate);
+        let band = self.band(trial.rate)?;
         let raw = self.measured(trial);
         let seen = smooth(&raw, band, trial.rate)?;
         let handle = match &trial.handle {
@@ -135,6 +143,7 @@ impl<const N: usize> Session<N> {
             ComparisonMode::Led => None,
             ComparisonMode::Torque => Some(motion(trial, band)?),
         };
+        let contact = self.contact_readings(number, &times)?;
         let margin = match self.comparison {
             ComparisonMode::Led => 0,
             ComparisonMode::Torque => margin(trial.rate, band),
@@ -153,7 +162,22 @@ impl<const N: usize> Session<N> {
             start,
             start_force,
             motion,
+            contact,
         })
+    }
+
+    /// Cutoff in which channels of a sampling rate are compared \[Hz\]: lower where torques of a contact are compared in a motion that is
+    /// known with noise, as of cameras.
+    ///
+    /// # Errors
+    /// [`GapError::Numerics`] for a trial too short for the filters.
+    fn band(&self, rate: f64) -> Result<f64, GapError> {
+        let band = BAND.min(0.2 * rate);
+        if self.comparison == ComparisonMode::Led || !self.reads_contact() {
+            return Ok(band);
+        }
+        let trials: Vec<&Trial<N>> = self.trials.iter().collect();
+        Ok(band.min(candidates_of_measured(&trials)?[0]))
     }
 
     fn measured(&self, trial: &Trial<N>) -> Channels {
@@ -302,44 +326,6 @@ impl<const N: usize> Session<N> {
         Ok(angles.chain(forces).collect())
     }
 
-    /// Joint torques by inverse dynamics of the measured motion.
-    ///
-    /// # Errors
-    /// [`SimulationError`] for a rig that cannot be.
-    pub fn torques(
-        &self,
-        hypothesis: &Hypothesis<N>,
-        course: &Course<N>,
-    ) -> Result<Channels, SimulationError> {
-        let Some(motion) = &course.motion else {
-            return Ok(Vec::new());
-        };
-        let effects = hypothesis.effects();
-        let chain = self.rig(hypothesis)?.chain()?;
-        let offset = offsets(&effects);
-        let mut states = vec![[0.0; MAX_STATES]; effects.len()];
-        let mut before: Option<Motion<f64, N>> = None;
-        let mut channels = vec![Vec::with_capacity(course.times.len()); N];
-        for (i, &time) in course.times.iter().enumerate() {
-            let (q, qd, qdd) = true_motion(hypothesis, motion, i);
-            let chain = motion.felt(&chain, i);
-            let q = q - offset;
-            let pose = Pose::new(&q);
-            let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);
-            let mut at = Motion::new(time, q, qd).with_joint_force(&through);
-            at.qdd = qdd;
-            if let Some(from) = before.replace(at) {
-                advance_states(&effects, (&from, &at), &mut states, 1.0 / course.rate);
-            }
-            let torque = inverse_dynamics(&chain, &pose, &qd, &qdd)
-                + resisting_torque(&effects, &at, &states);
-            for (channel, value) in channels.iter_mut().zip(torque.iter()) {
-                channel.push(*value);
-            }
-        }
-        Ok(channels)
-    }
-
     /// Whether a change reaches the sensors alone, so that a run need not be repeated.
     pub fn is_sensing(&self, hypothesis: &Hypothesis<N>, target: Target) -> bool {
         let sensing = |effect: &Effect<f64>| {
@@ -437,53 +423,6 @@ pub(super) fn in_common_band<const N: usize>(
 pub fn difference(a: &Channels, b: &Channels) -> Channels {
     let one = |(a, b): (&Vec<f64>, &Vec<f64>)| std::iter::zip(a, b).map(|(a, b)| a - b).collect();
     std::iter::zip(a, b).map(one).collect()
-}
-
-/// Angles, speeds and accelerations at a sample, without what an eccentric encoder adds to them.
-fn true_motion<const N: usize>(
-    hypothesis: &Hypothesis<N>,
-    motion: &Kinematics<N>,
-    i: usize,
-) -> (Joints<f64, N>, Joints<f64, N>, Joints<f64, N>) {
-    let (mut q, mut qd, mut qdd) = (motion.q[i], motion.qd[i], motion.qdd[i]);
-    for (j, [cosine, sine]) in hypothesis.eccentricity.into_iter().enumerate() {
-        if cosine != 0.0 || sine != 0.0 {
-            let (sin, cos) = libm::sincos(q[j]);
-            // The error, and its first and second derivative with respect to the angle.
-            let error = cosine * cos + sine * sin;
-            let slope = sine * cos - cosine * sin;
-            qdd[j] -= slope * qdd[j] - error * qd[j] * qd[j];
-            qd[j] -= slope * qd[j];
-            q[j] -= error;
-        }
-    }
-    (q, qd, qdd)
-}
-
-/// Angles without what an eccentric encoder adds to them.
-pub(crate) fn unbent<const N: usize>(
-    hypothesis: &Hypothesis<N>,
-    q: &Joints<f64, N>,
-) -> Joints<f64, N> {
-    Joints::from_fn(|j, _| {
-        let [cosine, sine] = hypothesis.eccentricity[j];
-        let (sin, cos) = libm::sincos(q[j]);
-        q[j] - cosine * cos - sine * sin
-    })
-}
-
-/// What the sensors of the angles add to them.
-pub(crate) fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N> {
-    let mut reading = Reading::<f64, N> {
-        time: 0.0,
-        q: Joints::zeros(),
-        force_on_arm: [0.0; 2],
-        moment_on_arm: 0.0,
-    };
-    for effect in effects {
-        effect.distort(&mut reading);
-    }
-    reading.q
 }
 
 /// Longest step with which steep resistance does not rattle \[s\]: one time constant of its slope at rest on the inertia of its

@@ -2,16 +2,18 @@
 
 use arm_core::effect::{Effect, Kind, Motion, dry_friction, resisting_besides_dry};
 use arm_core::{
-    Chain, Contact, Joints, Placement, Plane, Pose, Reading, Setup, inverse_dynamics, jacobian,
-    joint_force, static_torque, tip,
+    Chain, Contact, Joints, Placement, Plane, Pose, Setup, inverse_dynamics, jacobian, joint_force,
+    static_torque, tip,
 };
 use arm_ident::regression::trial::Trial;
 use arm_sim::{Experiment, SimulationError, Start, simulate};
 use nalgebra::{SMatrix, Vector2};
 
 use crate::data::session::Session;
+use crate::measurement_model::contact_readings::Sensing;
 use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Course, offsets};
+use crate::measurement_model::joint_torques::offsets;
+use crate::measurement_model::prediction::Course;
 
 /// Samples at the start whose mean tells where the arm was at rest.
 const START: usize = 5;
@@ -170,19 +172,10 @@ impl<const N: usize> Course<N> {
     }
 }
 
-/// Force on the arm at the start \[N\]: what is measured, less what effects in the sensors add.
+/// Force on the arm at the start \[N\]: what is measured, without what effects in the sensors make of it.
 fn felt_at_start<const N: usize>(effects: &[Effect<f64>], course: &Course<N>) -> Plane<f64> {
-    let measured = Reading::<f64, N> {
-        time: 0.0,
-        q: course.start,
-        force_on_arm: course.start_force,
-        moment_on_arm: 0.0,
-    };
-    let mut distorted = measured;
-    for effect in effects {
-        effect.distort(&mut distorted);
-    }
-    [0, 1].map(|a| 2.0 * measured.force_on_arm[a] - distorted.force_on_arm[a])
+    let [y, z] = course.start_force;
+    Sensing::of(effects).undone(0.0, [y, z, 0.0]).0
 }
 
 /// Where a contact that bears a force has the hand \[m\]; `None` where it bears none.

@@ -49,7 +49,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             periodic: None,
             measured: self.courses.clone(),
         };
-        if led {
+        if self.session.reads_contact() {
             progress("looking at single trials", 0.05)?;
             settled = self.set_apart(settled, &mut apart)?;
         }

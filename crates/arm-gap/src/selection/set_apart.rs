@@ -6,6 +6,7 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
+use crate::data::session::ComparisonMode;
 use crate::measurement_model::prediction::Course;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::search_state::{Progress, SearchState, Settled};
@@ -40,7 +41,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         mut settled: Settled<'a, N>,
         apart: &mut SetApart<N>,
     ) -> Result<Settled<'a, N>, GapError> {
-        if let Some(found) = self.rhythm(&settled.1, Line::BetweenRepeats)? {
+        let led = self.session.comparison == ComparisonMode::Led;
+        let rhythm = led.then(|| self.rhythm(&settled.1, Line::BetweenRepeats));
+        if let Some(found) = rhythm.transpose()?.flatten() {
             self.take_out(&settled.1, &found)?;
             apart.trial_specific.push(found);
             settled = self.calibrate_anew()?;

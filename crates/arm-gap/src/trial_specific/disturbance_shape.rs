@@ -4,9 +4,9 @@ use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
 
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::prediction::{Channels, smooth};
+use crate::measurement_model::prediction::{Channels, Course, smooth};
 use crate::sensitivity::linear_response::Change;
-use crate::sensitivity::linearization_point::LinearizationPoint;
+use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::trial_specific::component::timing_of;
 
 /// Time between the starts that are tried \[s\]: a third of the shortest burst.
@@ -50,7 +50,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         /// Durations of bursts that are tried \[s\], each twice the one before.
         const LONG: [f64; 3] = [0.3, 0.6, 1.2];
         if point.lines.is_empty() {
-            return Vec::new();
+            return self.slips_in_torques(point, group);
         }
         let course = &self.courses[self.references[group]];
         let count = course.raw[0].len();
@@ -63,35 +63,96 @@ impl<const N: usize> PreparedSession<'_, N> {
                 effects.extend((0..starts).map(at));
             }
         }
-        // A slip within the trial; what is off from its start is how the handle is held and the sensor was put on.
-        let within = 10..starts.saturating_sub(10);
         for &kind in of(Nature::Slip) {
             let at = |s| Effect::new(kind, 0).with(&[0.0, 0.0, EVERY * s as f64]);
-            effects.extend(within.clone().map(at));
+            effects.extend(within(starts).map(at));
         }
         let answered = self.parallel(effects.len(), |i| self.shape_of(point, group, effects[i]));
         let mut shapes: Vec<Shape> = answered.into_iter().flatten().collect();
-        let sensors = KINDS
-            .iter()
-            .filter(|k| k.info().place == Place::AngleSensor);
-        for (&kind, j) in sensors.flat_map(|k| (0..N).map(move |j| (k, j))) {
-            for s in within.clone() {
-                let first = (EVERY * s as f64 * course.rate) as usize;
-                let step = (0..count).map(|i| f64::from(u8::from(i >= first)));
-                // In the band of what it is compared with.
-                let Ok(slip) = smooth(&[step.collect()], course.band, course.rate) else {
-                    continue;
-                };
-                let mut channels = vec![vec![0.0; count]; self.session.channels()];
-                channels.splice(j..=j, slip);
-                let mut effect = Effect::new(kind, j);
-                effect.parameters[timing_of(kind).0] = EVERY * s as f64;
-                let columns = vec![(0, channels)];
-                shapes.push(Shape { effect, columns });
-            }
+        for (&kind, j) in angle_sensors::<N>() {
+            let mut shown = vec![vec![0.0; count]; self.session.channels()];
+            shown[j] = vec![1.0; count];
+            shapes.extend(slips_within(Effect::new(kind, j), &[(0, shown)], course));
         }
         shapes
     }
+
+    /// Slips of the handle and of every angle sensor where torques are compared that a contact exerts: what has slipped stays, and its
+    /// torque is that of a slip before the start.
+    fn slips_in_torques(&self, point: &LinearizationPoint<N>, group: usize) -> Vec<Shape> {
+        /// A start before any trial \[s\].
+        const BEFORE: f64 = -1.0;
+        if !self.session.reads_contact() {
+            return Vec::new();
+        }
+        let course = &self.courses[self.references[group]];
+        let place = (group, course.as_ref());
+        let Ok(base) = self.follow_raw(point, &point.hypothesis, place) else {
+            return Vec::new();
+        };
+        let handles = KINDS.iter().filter(|k| k.prior().nature == Nature::Slip);
+        let all = handles.map(|kind| (kind, 0)).chain(angle_sensors::<N>());
+        let one = |(&kind, j): (&Kind, usize)| {
+            let part = kind.prior().parts.first()?;
+            let mut effect = Effect::new(kind, j);
+            effect.parameters[timing_of(kind).0] = BEFORE;
+            let shown = |&p: &usize| {
+                let mut changed = point.hypothesis.clone();
+                let mut slipped = effect;
+                slipped.parameters[p] = part.small;
+                changed.named.push(slipped);
+                let up = self.follow_raw(point, &changed, place).ok()?;
+                Some((p, slope(&up, &base, part.small)))
+            };
+            let shown = part.sizes.iter().map(shown).collect::<Option<Vec<_>>>()?;
+            Some(slips_within(effect, &shown, course))
+        };
+        all.filter_map(one).flatten().collect()
+    }
+}
+
+/// The kinds of errors of angle sensors, in every joint.
+fn angle_sensors<const N: usize>() -> impl Iterator<Item = (&'static Kind, usize)> {
+    let sensors = KINDS
+        .iter()
+        .filter(|k| k.info().place == Place::AngleSensor);
+    sensors.flat_map(|kind| (0..N).map(move |j| (kind, j)))
+}
+
+/// What shows from some time on, for all times within a trial that are tried; what is off from its start is how the handle is held and
+/// the sensor was put on.
+///
+/// * `shown` - by the size that it shows for one unit of
+fn slips_within<const N: usize>(
+    effect: Effect<f64>,
+    shown: &[(usize, Channels)],
+    course: &Course<N>,
+) -> Vec<Shape> {
+    let count = course.raw[0].len();
+    let starts = (count as f64 / course.rate / EVERY) as usize;
+    let from = |s: usize| {
+        let first = (EVERY * s as f64 * course.rate) as usize;
+        let cut = |channel: &Vec<f64>| {
+            let each = channel.iter().enumerate();
+            each.map(|(i, v)| if i >= first { *v } else { 0.0 })
+                .collect()
+        };
+        let column = |(p, channels): &(usize, Channels)| {
+            let cut: Channels = channels.iter().map(cut).collect();
+            // In the band of what it is compared with.
+            Some((*p, smooth(&cut, course.band, course.rate).ok()?))
+        };
+        let mut effect = effect;
+        effect.parameters[timing_of(effect.kind).0] = EVERY * s as f64;
+        let columns = shown.iter().map(column).collect::<Option<Vec<_>>>()?;
+        Some(Shape { effect, columns })
+    };
+    within(starts).filter_map(from).collect()
+}
+
+/// The starts that are tried for what slips within a trial.
+fn within(starts: usize) -> std::ops::Range<usize> {
+    10..starts.saturating_sub(10)
 }
 
 /// A disturbance that is asked for, with what it would show.

@@ -17,10 +17,9 @@ from ..setup import examine_setup, other_weight
 from .between_samples import unresolved
 from .core_input import core_settings, core_trials
 
-_BY_TORQUES = (
-    "so all trials are compared by joint torques in measured motion, and errors of the contact, the robot and the force sensor, "
-    "misalignment, delay, tremor and bursts cannot be tested"
-)
+_BY_TORQUES = "so all trials are compared by joint torques in measured motion"
+_NOT_TOLD = "The contact, the robot, a first joint that moves, tremor and bursts cannot be tested that way"
+_NO_FORCES = "nor can errors of the force sensor, its misalignment and its delay"
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
 _NEAR = 0.02
@@ -92,12 +91,13 @@ def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
     """Return which trials keep the others from being compared in the closed chain, and what is not asked for it."""
     if led or not any(t.force_on_arm is not None for t in dataset.trials):
         return []
-    if dataset.model.robot is None or not any(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials):
-        return [f"no angles of a robot, or no [robot] in the model: {_BY_TORQUES}"]
-    angles = ", ".join(t.file for t in dataset.trials if t.robot_q is None)
     forces = ", ".join(t.file for t in dataset.trials if t.force_on_arm is None)
+    not_told = f"{_NOT_TOLD}; {_NO_FORCES}" if forces else _NOT_TOLD
+    if dataset.model.robot is None or not any(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials):
+        return [f"no angles of a robot, or no [robot] in the model: {_BY_TORQUES}. {not_told}"]
+    angles = ", ".join(t.file for t in dataset.trials if t.robot_q is None)
     missing = [f"no {what} in {files}" for what, files in (("robot angles", angles), ("contact forces", forces)) if files]
-    return [f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack"]
+    return [f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack. {not_told}"]
 
 
 def _still_joints(dataset: Dataset, led: bool) -> list[str]:
