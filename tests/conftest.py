@@ -16,7 +16,10 @@ import pytest
 
 from browser import shared
 
-LONG = ("test_reproduce.py", "test_pages.py", "test_fmu_defects.py", "test_gap.py", "test_demo.py", "test_import.py", "test_sweep.py")
+LONG = (
+    "test_reproduce.py", "test_pages.py", "test_setup_matrix.py", "test_demo.py", "test_fmu_defects.py", "test_sweep.py", "test_first_day.py",
+    "test_friction.py", "test_passive_moments.py",
+)  # fmt: skip
 """Files that take longest. They come first, so that no process works on one of them alone at the end."""
 
 MODEL = """\
