@@ -14,7 +14,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import pytest
 
-LONG = ("test_reproduce.py", "test_pages.py", "test_fmu_defects.py", "test_gap.py", "test_demo.py", "test_import.py", "test_sweep.py")
+from browser import shared
+
+LONG = (
+    "test_reproduce.py", "test_pages.py", "test_setup_matrix.py", "test_demo.py", "test_fmu_defects.py", "test_sweep.py", "test_first_day.py",
+    "test_friction.py", "test_passive_moments.py",
+)  # fmt: skip
 """Files that take longest. They come first, so that no process works on one of them alone at the end."""
 
 MODEL = """\
@@ -211,6 +216,13 @@ def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     write_dataset(Dataset("slow arm", handed_over(truth), trials, "robot", synthetic=True), folder)
     return folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_browser() -> Iterator[None]:
+    """All pages of a file are opened in one browser."""
+    with shared():
+        yield
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -306,16 +306,12 @@ def stubs() -> str:
 
 @cache
 def library(defect: str, *others: str) -> bytes:
-    """Compile the small library with one thing that it does wrong, and other C beside it."""
+    """Compile the small library with one thing that it does wrong, and other C behind it, as one source: a start costs more than its text."""
     with TemporaryDirectory() as folder:
         built = Path(folder) / "small"
-        sources = [str(SOURCE)]
-        for number, text in enumerate((stubs(), *others)):
-            path = Path(folder) / f"{number}.c"
-            path.write_text(text, encoding="utf-8")
-            sources.append(str(path))
-        command = ["cc", "-shared", "-fPIC", "-w", *([f"-D{defect}"] if defect else []), "-o", str(built), *sources, "-lm"]
-        subprocess.run(command, check=True, capture_output=True)
+        command = ["cc", "-shared", "-fPIC", "-w", *([f"-D{defect}"] if defect else []), "-o", str(built), "-x", "c", "-", "-lm"]
+        source = "\n".join((SOURCE.read_text(encoding="utf-8"), stubs(), *others))
+        subprocess.run(command, input=source.encode(), check=True, capture_output=True)
         return built.read_bytes()
 
 

@@ -9,6 +9,7 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -74,6 +75,17 @@ def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
 
 
 # ---- Python
+def parsed(path: Path) -> ast.Module:
+    """Return the syntax of a Python file."""
+    return _syntax(path.read_text(encoding="utf-8"))
+
+
+@cache
+def _syntax(source: str) -> ast.Module:
+    """Return the syntax of a source, of which several rules ask."""
+    return ast.parse(source)
+
+
 @dataclass(frozen=True)
 class PythonModule:
     """A module by its syntax and the package that its relative imports start from."""
@@ -84,9 +96,13 @@ class PythonModule:
 
 def python_functions(path: Path) -> Iterator[tuple[str, int]]:
     """Yield name and lines of the functions of a Python file, docstrings with them."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    todo: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    while todo:
+        node = todo.pop()
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.name, (node.end_lineno or node.lineno) - node.lineno + 1
+        # No function stands in an expression.
+        todo += (child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt | ast.excepthandler | ast.match_case))
 
 
 def python_modules(package: Path) -> dict[str, PythonModule]:
@@ -96,8 +112,7 @@ def python_modules(package: Path) -> dict[str, PythonModule]:
         parts = (package.name, *path.relative_to(package).with_suffix("").parts)
         is_package = parts[-1] == "__init__"
         name = ".".join(parts[:-1] if is_package else parts)
-        syntax = ast.parse(path.read_text(encoding="utf-8"))
-        found[name] = PythonModule(syntax, name if is_package else name.rpartition(".")[0])
+        found[name] = PythonModule(parsed(path), name if is_package else name.rpartition(".")[0])
     return found
 
 
@@ -137,7 +152,7 @@ def _imports(package: Path, late_alone: bool = False) -> dict[str, set[str]]:
 
 def loads_by_name(path: Path) -> bool:
     """Whether a file loads modules by a name that may be anything."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = {alias.name for alias in node.names}
             by_name = names & LOADERS if isinstance(node, ast.Import) else node.module in LOADERS and not names <= {"util", "resources"}
@@ -167,8 +182,10 @@ def block_end(code: str, start: int) -> int:
     return len(code)
 
 
-def without_tests(code: str) -> str:
-    """Return blanked Rust source with blanks for its modules of tests as well."""
+@cache
+def bare(source: str) -> str:
+    """Return Rust source with blanks for comments, literals and its modules of tests."""
+    code = blanked(source)
     while found := TEST_MODULE.search(code):
         end = block_end(code, found.end())
         code = code[: found.start()] + re.sub(r"[^\n]", " ", code[found.start() : end]) + code[end:]
@@ -177,7 +194,7 @@ def without_tests(code: str) -> str:
 
 def rust_functions(path: Path) -> Iterator[tuple[str, int]]:
     """Yield name and lines of the functions of a Rust file, tests apart."""
-    code = without_tests(blanked(path.read_text(encoding="utf-8")))
+    code = bare(path.read_text(encoding="utf-8"))
     for found in FUNCTION.finditer(code):
         yield found[1], code.count("\n", found.start(), block_end(code, found.end())) + 1
 
@@ -205,7 +222,7 @@ def leaves(tree: str) -> Iterator[tuple[list[str], str]]:
 
 def variants(path: Path, enum: str) -> set[str]:
     """Return the variants of an enum that a Rust file names outside its tests."""
-    code = without_tests(blanked(path.read_text(encoding="utf-8")))
+    code = bare(path.read_text(encoding="utf-8"))
     return set(re.findall(rf"\b{enum}::([A-Z]\w*)", code))
 
 
@@ -264,7 +281,7 @@ def rust_file(code: str, module: tuple[str, ...], children: set[str]) -> RustFil
 
 def rust_imports(source: Path) -> dict[str, set[str]]:
     """Return which files of a crate each uses: where what it names is defined, not where it is handed on."""
-    codes = {rust_module(path, source): without_tests(blanked(path.read_text(encoding="utf-8"))) for path in sorted(source.rglob("*.rs"))}
+    codes = {rust_module(path, source): bare(path.read_text(encoding="utf-8")) for path in sorted(source.rglob("*.rs"))}
     files = {
         module: rust_file(code, module, {other[-1] for other in codes if other and other[:-1] == module}) for module, code in codes.items()
     }

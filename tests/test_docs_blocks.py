@@ -86,8 +86,10 @@ def test_own_data_in_five_commands(folder: Path, capsys: pytest.CaptureFixture[s
         assert (folder / file).is_file(), file
 
 
-@pytest.mark.parametrize("page", ["notebooks.md", "theory-model.md"])
-def test_python_prints_what_its_comments_say(page: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("page", "ends", "drawn"), [("notebooks.md", " N m\n", ["swing.png"]), ("theory-model.md", "", [])])
+def test_python_prints_what_its_comments_say(
+    page: str, ends: str, drawn: list[str], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     ran = 0
     for language, _, content in blocks(DOCS / page):
         if language == "python":
@@ -97,6 +99,8 @@ def test_python_prints_what_its_comments_say(page: str, folder: Path, capsys: py
                 assert told in printed
             ran += 1
     assert ran
+    assert printed.endswith(ends)
+    assert all((folder / name).stat().st_size > 10_000 for name in drawn)
 
 
 def test_python_of_the_firmware_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

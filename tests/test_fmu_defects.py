@@ -194,7 +194,7 @@ def test_there_are_more_than_120_of_them() -> None:
 @NEEDS_COMPILER
 def test_a_library_writes_nothing_outside_its_folder(tmp_path: Path) -> None:
     outside = tmp_path / "outside.txt"
-    stub = f'#include <stdio.h>\n__attribute__((constructor)) static void write(void) {{ FILE *f = fopen("{outside}", "w"); if (f) fclose(f); }}\n'
+    stub = f'#include <stdio.h>\n__attribute__((constructor)) static void leave(void) {{ FILE *f = fopen("{outside}", "w"); if (f) fclose(f); }}\n'
     source = fmu_defects.packed(tmp_path / "small.fmu", fmu_defects.SMALL, small=fmu_defects.library("", stub))
     found = check_fmu(source)
     if any(f.place == "sandbox" for f in found):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -54,11 +53,3 @@ def test_the_documents_link_each() -> None:
     page = (ROOT / "docs" / "notebooks.md").read_text(encoding="utf-8")
     assert all(f"examples/notebooks/{path.name}" in page for path in NOTEBOOKS)
     assert "docs/notebooks.md" in (ROOT / "README.md").read_text(encoding="utf-8")
-
-
-def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    matplotlib.use("Agg")
-    monkeypatch.chdir(tmp_path)
-    (block,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "notebooks.md").read_text(encoding="utf-8"), flags=re.M | re.S)
-    exec(block, {})
-    assert capsys.readouterr().out.endswith("N m\n") and (tmp_path / "swing.png").stat().st_size > 10_000

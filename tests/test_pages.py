@@ -6,7 +6,6 @@ import importlib
 import json
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from armrs import cli, online
 from armrs.report import series
 from armrs.tabular import Tabular
 from armrs.workflows import demo, history
-from browser import faults_on_paper, faults_on_screens, opened, shared
+from browser import faults_on_paper, faults_on_screens, opened
 from results import kinds
 from test_cohort import population, table
 from test_docs import DOCS, ROOT, blocks
@@ -87,10 +86,9 @@ def made(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
 
 
 @pytest.fixture(scope="module")
-def pages(made: tuple[Path, dict[str, Tabular]]) -> Iterator[Path]:
-    """The pages of `made`, to be opened in one browser."""
-    with shared():
-        yield made[0]
+def pages(made: tuple[Path, dict[str, Tabular]]) -> Path:
+    """The pages of `made`."""
+    return made[0]
 
 
 @pytest.mark.parametrize("kind", [kind.__name__ for kind in kinds() if kind is not armrs.Demonstration])

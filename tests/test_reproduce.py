@@ -5,7 +5,6 @@ from __future__ import annotations
 import colorsys
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from matplotlib.colors import to_rgb
 
 from armrs import cli
 from armrs.thesis.people import TABLE_4_10
-from browser import OF_COLOURS, faults_on_paper, faults_on_screens, opened, shared, violations
+from browser import OF_COLOURS, ONE_OF_A_KIND, WIDTHS, faults_on_paper, faults_on_screens, opened, violations
 
 NEEDED = {"3.5", "3.6", "3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
 """Tables and figures that some item has to be about."""
@@ -44,11 +43,10 @@ def numbered(text: str) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("thesis")
     assert cli.main(["reproduce", "-o", str(folder)]) == 0
-    with shared():
-        yield folder
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -187,16 +185,32 @@ def test_the_page_is_clicked_through(made: Path, items: dict[str, dict[str, Any]
         assert page.locator("article").count() == len(items)
 
 
+SHOWN_ALONE = """() => {
+  const every = window.every ??= [...document.querySelectorAll('.part')];
+  every.forEach(part => part.remove());
+  document.querySelector('nav').after(every.find(part => !part.hidden));
+}"""
+"""Takes the parts that are hidden out of the page: axe-core finds nothing in them, and looks for half of its time."""
+
+
 def test_axe_core_finds_nothing_in_any_part(made: Path) -> None:
     with opened(made / "report.html", width=1400) as seen:
-        for key in seen.page.eval_on_selector_all("nav button", "buttons => buttons.map(b => b.dataset.part)"):
-            seen.page.set_viewport_size({"width": 1400, "height": 900})
-            seen.page.click(f"nav button[data-part={key}]")
+        page = seen.page
+        keys = page.eval_on_selector_all("nav button", "buttons => buttons.map(b => b.dataset.part)")
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 900})
+            for key in keys:
+                page.click(f"nav button[data-part={key}]")
+                assert page.evaluate("document.documentElement.scrollWidth") <= width, key
+        page.evaluate(ONE_OF_A_KIND)
+        for key in keys:
+            page.set_viewport_size({"width": 1400, "height": 900})
+            page.click(f"nav button[data-part={key}]")
+            page.evaluate(SHOWN_ALONE)
             for scheme, width, rules in (("light", 1400, ()), ("dark", 1400, OF_COLOURS), ("dark", 390, ())):
-                seen.page.emulate_media(color_scheme=scheme)
-                seen.page.set_viewport_size({"width": width, "height": 900})
-                assert violations(seen.page, rules) == [], (key, scheme, width)
-                assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+                page.emulate_media(color_scheme=scheme)
+                page.set_viewport_size({"width": width, "height": 900})
+                assert violations(page, rules) == [], (key, scheme, width)
 
 
 def test_links_jump_to_what_they_name(made: Path) -> None:

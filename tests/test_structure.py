@@ -130,7 +130,7 @@ def test_python_names_no_kind_of_effect_without_a_reason() -> None:
     kinds = {k.kind for k in catalogue().values()} - {"inertia", "elastic", "force_gain", "angle_offset"}
     found = set()
     for path in PACKAGE.rglob("*.py"):
-        strings = (node.value for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Constant))
+        strings = (node.value for node in ast.walk(structure.parsed(path)) if isinstance(node, ast.Constant))
         if path.parent.name != "thesis" and kinds & {s for s in strings if isinstance(s, str)}:
             found.add(path.relative_to(PACKAGE).as_posix())
     assert found == set(NAMED_IN_PYTHON)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -84,7 +85,7 @@ class Shape:
 class Problem:
     """Moments of trials less their means, which differ from trial to trial and say nothing of the shape.
 
-    Where shared errors are asked, what they may do is taken out of moments and law alike: with `Z` what they do and `σ` the noise,
+    Where shared errors count, what they may do is taken out of moments and law alike: with `Z` what they do and `σ` the noise,
     `‖W r‖² = min_b ‖r − Z b‖² + σ² ‖b‖²`.
     """
 
@@ -98,13 +99,23 @@ class Problem:
         self.count = len(courses)
         self.seen = self._less_means(np.concatenate([c.moment for c in courses]))
         self.shared = np.empty((len(self.q), 0)), np.empty(0)
-        if with_errors and all(c.errors.size for c in courses):
+        if with_errors:
             left, sizes, _ = np.linalg.svd(self._less_means(np.concatenate([c.errors for c in courses])), full_matrices=False)
             noise = _noise(courses)
             self.shared = left, 1.0 - noise / np.sqrt(sizes**2 + noise**2)
         self.moment = self._within(self.seen)
 
-    def fit(self, *, ratios: bool) -> Shape:
+    @cached_property
+    def linear(self) -> Shape:
+        """The shape with both ratios zero."""
+        return self._fitted(ratios=False)
+
+    @cached_property
+    def full(self) -> Shape:
+        """The shape with ratios."""
+        return self._fitted(ratios=True)
+
+    def _fitted(self, *, ratios: bool) -> Shape:
         """Fit the shape, with ratios or with both zero; without exponentials where these take too little away."""
         plain = self._shape(np.zeros(7), np.array([False, False, True, *[False] * 4]))
         starts = (self._begun(k) for k in _STARTS)
@@ -187,12 +198,10 @@ class Problem:
         scale = np.linalg.norm(jacobian, axis=0) + 1e-300
         scaled = jacobian / scale
         whole = scaled.T @ scaled + np.diag(known / scale**2)
-        away = []
-        for trial in range(self.count):
-            own = self.trial == trial
-            part = scaled[own]
-            away.append(np.linalg.pinv(whole - part.T @ part, hermitian=True) @ (part.T @ residual[own]))
-        moved = np.array(away) - np.mean(away, axis=0)
+        parts = [(scaled[own], residual[own]) for own in (self.trial == trial for trial in range(self.count))]
+        inverses = np.linalg.pinv(np.array([whole - part.T @ part for part, _ in parts]), hermitian=True)
+        away = np.array([inverse @ (part.T @ rest) for inverse, (part, rest) in zip(inverses, parts, strict=True)])
+        moved = away - away.mean(axis=0)
         jackknife = (self.count - 1) / self.count * np.sum(moved**2, axis=0)
         return np.asarray(np.sqrt(np.maximum(jackknife, variance * np.diag(np.linalg.pinv(whole, hermitian=True)))) / scale)
 

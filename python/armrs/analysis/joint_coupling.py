@@ -201,11 +201,10 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     if len(courses) < 4 or np.ptp(held) < LEAST_HELD:
         return None
     problem = Problem(courses)
-    plain = problem.fit(ratios=False)
-    linear_p_value, share = _linear_law(courses, level)
-    mean = _levels(problem, courses, plain)
-    shape = plain if share < LEAST_SHARE else problem.fit(ratios=True)
-    line = mean if shape is plain else _levels(problem, courses, shape)
+    linear_p_value, share = _linear_law(Problem(courses, with_errors=True) if all(c.errors.size for c in courses) else problem, level)
+    mean = _levels(problem, courses, problem.linear)
+    shape = problem.linear if share < LEAST_SHARE else problem.full
+    line = mean if shape is problem.linear else _levels(problem, courses, shape)
     return Dependence(
         joint=joint,
         adjacent=adjacent,
@@ -224,12 +223,10 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     )
 
 
-def _linear_law(courses: Sequence[Course], level: float) -> tuple[float, float]:
+def _linear_law(problem: Problem, level: float) -> tuple[float, float]:
     """Return the p value of the law without ratios, and what ratios change where that refuses it, beside what shared errors may do."""
-    problem = Problem(courses, with_errors=True)
-    plain = problem.fit(ratios=False)
-    p_value = problem.linear_law_p_value(plain)
-    return p_value, 0.0 if p_value >= 1.0 - level else problem.share(problem.fit(ratios=True), plain)
+    p_value = problem.linear_law_p_value(problem.linear)
+    return p_value, 0.0 if p_value >= 1.0 - level else problem.share(problem.full, problem.linear)
 
 
 def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:
