@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -173,7 +173,25 @@ class Coupling:
         }
 
 
-def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.95) -> Dependence | None:
+def fit_joints(courses: Mapping[tuple[int, int], Sequence[Course]], level: float = 0.95) -> tuple[Dependence, ...]:
+    """Fit the joints, each by its courses and the adjacent joint, those left out of which nothing can be told.
+
+    Ends of a range that move with the adjacent angle belong to an energy `exp(k (q + r a))`, and so to the moments of both joints. Where
+    each was moved while the other was held, both are asked together: twice the smaller p value (Bonferroni) is that of either. The weight
+    of an arm known to 5 % hides them in the shoulder, and not in the elbow.
+    """
+    told = {key: own for key, own in courses.items() if _enough(own)}
+    alone = {key: _p_value(own) for key, own in told.items()}
+    found = []
+    for (joint, adjacent), own in told.items():
+        both = [alone[key] for key in ((joint, adjacent), (adjacent, joint)) if key in alone]
+        found.append(fit(own, joint, adjacent, level, linear_p_value=min(len(both) * min(both), 1.0)))
+    return tuple(one for one in found if one is not None)
+
+
+def fit(
+    courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.95, linear_p_value: float | None = None
+) -> Dependence | None:
     """Fit the dependence of an elastic moment on both angles.
 
     Parameters
@@ -184,6 +202,8 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
         From 1.
     level : float
         Probability of the intervals.
+    linear_p_value : float, optional
+        Of the linear law, where more than these courses says it.
 
     Returns
     -------
@@ -197,12 +217,12 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     against the adjacent angle, over trials, each configuration weighted by its scatter; Student's t tells it from the model without
     coupling, where it is zero. Ratios are fitted where the test refuses the linear law.
     """
-    held = np.array([c.adjacent for c in courses])
-    if len(courses) < 4 or np.ptp(held) < LEAST_HELD:
+    if not _enough(courses):
         return None
     problem = Problem(courses)
     plain = problem.fit(ratios=False)
-    linear_p_value, share = _linear_law(courses, level)
+    linear_p_value = _p_value(courses) if linear_p_value is None else linear_p_value
+    share = 0.0 if linear_p_value >= 1.0 - level else _share(courses)
     mean = _levels(problem, courses, plain)
     shape = plain if share < LEAST_SHARE else problem.fit(ratios=True)
     line = mean if shape is plain else _levels(problem, courses, shape)
@@ -224,12 +244,21 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     )
 
 
-def _linear_law(courses: Sequence[Course], level: float) -> tuple[float, float]:
-    """Return the p value of the law without ratios, and what ratios change where that refuses it, beside what shared errors may do."""
+def _enough(courses: Sequence[Course]) -> bool:
+    """Whether courses are enough to tell a dependence on the adjacent angle."""
+    return len(courses) >= 4 and bool(np.ptp([c.adjacent for c in courses]) >= LEAST_HELD)
+
+
+def _p_value(courses: Sequence[Course]) -> float:
+    """Return the p value of the law without ratios, beside what shared errors may do."""
     problem = Problem(courses, with_errors=True)
-    plain = problem.fit(ratios=False)
-    p_value = problem.linear_law_p_value(plain)
-    return p_value, 0.0 if p_value >= 1.0 - level else problem.share(problem.fit(ratios=True), plain)
+    return problem.linear_law_p_value(problem.fit(ratios=False))
+
+
+def _share(courses: Sequence[Course]) -> float:
+    """Return what ratios change, beside what shared errors may do."""
+    problem = Problem(courses, with_errors=True)
+    return problem.share(problem.fit(ratios=True), problem.fit(ratios=False))
 
 
 def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:

@@ -507,7 +507,7 @@ def _shifts(
 
 def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependence, ...]:
     """Fit every joint that moved in several configurations against the joint next to it, the one before where there are two."""
-    found = []
+    found: dict[tuple[int, int], list[double_exponential.Course]] = {}
     for joint in sorted({c.joint for c in curves}):
         own = [c for c in curves if c.joint == joint and _led_by(c)]
         n = own[0].held.shape[1] if own else 1
@@ -522,10 +522,8 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependen
                     known = np.nan_to_num(curve.elastic_errors[:, there].T)
                     course = (curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration, known)
                     courses.append(double_exponential.Course(*course))
-        fitted = joint_coupling.fit(courses, joint, adjacent, LEVEL)
-        if fitted is not None:
-            found.append(fitted)
-    return tuple(found)
+        found[joint, adjacent] = courses
+    return joint_coupling.fit_joints(found, LEVEL)
 
 
 def _led_by(curve: PassiveCurve) -> bool:
