@@ -146,6 +146,7 @@ def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> Non
         "Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it."
     ]
     assert len(clinic.notes([result(warnings=list("abcdef"))])) == clinic.MOST_NOTES + 1
+    assert clinic.notes([result(warnings=["slow: joint 2 moved"])]) == ["slow: elbow moved"]
 
 
 def test_a_slip_and_a_tremor_are_unusual_and_a_spring_is_not() -> None:

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import armrs
+from armrs.analysis import repeated
 from armrs.io.muscle_activity import co_contraction, comparable, mark_activity
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+import check_passive
+
+configurations = functools.cache(check_passive.configurations)
 SEGMENTS = (armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165), armrs.Segment("forearm", 0.264, 1.264, 0.121, 0.0074))
 JOINTS = (armrs.Joint("shoulder", viscosity=0.25), armrs.Joint("elbow", viscosity=0.2, stiffness=0.5, rest=0.6))
 ROBOT = armrs.Robot((0.45, 0.45), (1.05, -0.10))
@@ -58,7 +66,7 @@ def test_a_channel_that_is_active_all_the_time_marks_nothing_and_says_so() -> No
     assert marked[0].valid.all() or "resting level is not known" in lines[0]
 
 
-def test_a_burst_is_marked_with_a_margin_and_left_out_of_all_repeats_where_they_are_compared() -> None:
+def test_a_burst_is_marked_with_a_margin_and_left_out_of_all_repeats_where_gap_compares_them() -> None:
     trials = [trial(1, 11, False), trial(2, 12, True), trial(3, 13, False)]
     marked, lines = mark_activity(trials)
     assert [bool(m.active.any()) for m in marked] == [False, True, False]
@@ -107,6 +115,51 @@ def test_marks_take_most_of_what_a_burst_does_to_the_estimates() -> None:
 
     assert moved(identified(clean), identified(disturbed)) > 1.0
     assert moved(identified(same_samples), identified(compared)) < 0.1
+
+
+def disturbed_session(seed: int) -> tuple[armrs.Dataset, armrs.Dataset]:
+    """Three slow repeats of one configuration of the thesis with its tone; the second also with a burst of 1 N m, and its activity."""
+    known = [configurations(1.0)[seed % 10]]
+    dataset, draw = check_passive.session(known, seed, 1.0, 1.0), np.random.default_rng(seed)
+    noise = draw.standard_normal
+    trials = [dataclasses.replace(t, emg={"emg_biceps": 0.02 * noise(len(t))}) for t in dataset.trials if t.repeat <= 3]
+    second = trials[1]
+    since = (second.t - draw.uniform(0.5, second.t[-1] - 1.1)) / 0.6
+    torque = np.zeros(second.q.shape)
+    torque[:, known[0].joint - 1] = np.where((since >= 0.0) & (since <= 1.0), np.sin(np.pi * since) ** 2, 0.0)
+    segments = dataset.model.segments
+    arm = armrs.Arm(*([getattr(s, name) for s in segments] for name in ("length", "mass", "com", "inertia")))
+    force = np.linalg.solve(arm.jacobian(second.q).transpose(0, 2, 1), torque[:, :, None])[:, :, 0]
+    emg = second.emg["emg_biceps"] + np.where(torque.any(axis=1), 0.2, 0.0) * noise(len(second))
+    burst = dataclasses.replace(second, force_on_arm=second.force_on_arm - force, emg={"emg_biceps": emg})
+    return dataset.replace(trials=tuple(trials)), dataset.replace(trials=(trials[0], burst, trials[2]))
+
+
+def test_a_marked_burst_hardly_moves_passive_moments() -> None:
+    """In units of the intervals. Before, all repeats lost the angles of the burst, and means over other angles are other quantities."""
+
+    def moved(dataset: armrs.Dataset, base: armrs.Dataset) -> float:
+        pairs = zip(armrs.passive_moments(base).followed(), armrs.passive_moments(dataset).followed(), strict=True)
+        return max(abs(b.value - a.value) / (a.interval[1] - a.interval[0]) for a, b in pairs if np.isfinite(a.value))
+
+    shifts = []
+    for seed in range(120, 132):
+        quiet, burst = disturbed_session(seed)
+        marked = burst.replace(trials=mark_activity(burst.trials)[0])
+        shifts.append((moved(burst, quiet), moved(marked, quiet)))
+    without, left_out = np.median(shifts, axis=0)
+    assert without > 0.5
+    assert left_out < 0.1
+
+
+def test_a_gap_is_completed_by_the_shape_of_all_repeats_at_the_level_of_each() -> None:
+    shape, levels = np.sin(np.linspace(0.0, 2.0, 20)), np.array([0.0, 3.0, -1.0])
+    whole = shape + levels[:, None]
+    values = whole.copy()
+    values[0, 3:8] = values[1, 12:] = values[2, 15] = np.nan
+    completed = repeated.completed(values, np.array([True, True, False]))
+    np.testing.assert_allclose(completed[:2], whole[:2], atol=1e-6)
+    assert np.isnan(completed[2, 15])
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])

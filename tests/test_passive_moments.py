@@ -83,6 +83,14 @@ def test_the_coupling_is_found_with_the_scatter_of_the_thesis_and_not_made_up() 
     assert check_passive.over_trials(0.0, runs) / runs < 0.05 + beyond_chance
 
 
+@pytest.mark.parametrize("ratio", [0.0, 0.4])
+def test_ends_that_move_with_the_other_joint_are_told_at_both_joints(ratio: float) -> None:
+    """With the tone of the thesis. The weight of an arm known to 5 % hides them in the shoulder alone."""
+    for refused, errors in check_passive.ends_moved(1.0, ratio, 3, 1.0).values():
+        assert refused == float(ratio > 0.0)
+        assert errors[:, 2:].max() < 0.05
+
+
 def test_the_shape_comes_back(result: passive.PassiveMoments, known: list[check_passive.Configuration]) -> None:
     elbow = next(d for d in result.dependence if d.joint == 2)
     assert (elbow.adjacent, elbow.trials, elbow.coupled) == (1, 30, True)

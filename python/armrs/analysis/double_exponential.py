@@ -22,8 +22,8 @@ FLATTEST, STEEPEST, FARTHEST = 1.0, 20.0, 3.0
 """Bounds of a steepness [1/rad], and of the size of a ratio."""
 NAMES = ("upper", "lower", "stiffness", "upper_steepness", "lower_steepness", "upper_ratio", "lower_ratio")
 UNITS = ("N m", "N m", "N m/rad", "1/rad", "1/rad", "1", "1")
-_STARTS = (1.5, 4.1, 9.0)
-"""Steepnesses from which the fit starts [1/rad]."""
+_STARTS, _RATIO_STARTS = (1.5, 4.1, 9.0), (0.0, -1.5, 1.5)
+"""Steepnesses [1/rad] and ratios from which the fit starts."""
 _NEEDED = 0.01
 """Share of the residual that exponentials must take away to be needed."""
 _SIZE = 1e-9
@@ -118,7 +118,7 @@ class Problem:
     def _fitted(self, *, ratios: bool) -> Shape:
         """Fit the shape, with ratios or with both zero; without exponentials where these take too little away."""
         plain = self._shape(np.zeros(7), np.array([False, False, True, *[False] * 4]))
-        starts = (self._begun(k) for k in _STARTS)
+        starts = (self._begun(k, r) for r in (_RATIO_STARTS if ratios else (0.0,)) for k in _STARTS)
         values, variance = min((self._refined(*start, ratios) for start in starts), key=lambda found: found[1])
         values, variance = self._refined(values, variance, ratios)
         present = values[:2] > _SIZE * float(np.abs(self.moment).max(initial=0.0))
@@ -151,11 +151,11 @@ class Problem:
         sizes = np.einsum("ni,ij,nj->n", sums, weight, sums)
         return float(np.mean(sizes >= sizes[0] * (1.0 - 1e-9)))
 
-    def _begun(self, k: float) -> tuple[np.ndarray, float]:
-        """Return the best values with a given steepness and no ratios, and the variance that they leave."""
+    def _begun(self, k: float, ratio: float) -> tuple[np.ndarray, float]:
+        """Return the best values with a given steepness and ratio, and the variance that they leave."""
         from scipy.optimize import lsq_linear
 
-        values = np.array([1.0, 1.0, 1.0, k, k, 0.0, 0.0])
+        values = np.array([1.0, 1.0, 1.0, k, k, ratio, ratio])
         found = lsq_linear(self._columns(values), self.moment, bounds=([0.0, 0.0, -np.inf], np.inf), method="bvls")
         return np.array([*found.x, *values[3:]]), self._variance(2.0 * float(found.cost))
 

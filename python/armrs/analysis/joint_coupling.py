@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -173,6 +173,22 @@ class Coupling:
         }
 
 
+def fit_joints(courses: Mapping[tuple[int, int], Sequence[Course]], level: float = 0.95) -> tuple[Dependence, ...]:
+    """Fit the joints, each by its courses and the adjacent joint, those left out of which nothing can be told; see `fit`.
+
+    Ends of a range that move with the adjacent angle belong to an energy `exp(k (q + r a))`, and so to the moments of both joints. Where
+    each was moved while the other was held, both are asked together: twice the smaller p value (Bonferroni) is that of either. The weight
+    of an arm known to 5 % hides them in the shoulder, and not in the elbow.
+    """
+    told = {key: _Asked.of(own) for key, own in courses.items() if _enough(own)}
+    alone = {key: asked.beside_errors.linear_law_p_value(asked.beside_errors.linear) for key, asked in told.items()}
+    found = []
+    for (joint, adjacent), asked in told.items():
+        both = [alone[key] for key in ((joint, adjacent), (adjacent, joint)) if key in alone]
+        found.append(_fitted(asked, joint, adjacent, level, min(len(both) * min(both), 1.0)))
+    return tuple(found)
+
+
 def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.95) -> Dependence | None:
     """Fit the dependence of an elastic moment on both angles.
 
@@ -197,11 +213,31 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     against the adjacent angle, over trials, each configuration weighted by its scatter; Student's t tells it from the model without
     coupling, where it is zero. Ratios are fitted where the test refuses the linear law.
     """
-    held = np.array([c.adjacent for c in courses])
-    if len(courses) < 4 or np.ptp(held) < LEAST_HELD:
-        return None
-    problem = Problem(courses)
-    linear_p_value, share = _linear_law(Problem(courses, with_errors=True) if all(c.errors.size for c in courses) else problem, level)
+    return next(iter(fit_joints({(joint, adjacent): courses}, level)), None)
+
+
+def _enough(courses: Sequence[Course]) -> bool:
+    """Whether courses are enough to tell a dependence on the adjacent angle."""
+    return len(courses) >= 4 and bool(np.ptp([c.adjacent for c in courses]) >= LEAST_HELD)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Courses, their moments, and these beside what shared errors may do, where any are known."""
+
+    courses: Sequence[Course]
+    moments: Problem
+    beside_errors: Problem
+
+    @classmethod
+    def of(cls, courses: Sequence[Course]) -> _Asked:
+        moments = Problem(courses)
+        return cls(courses, moments, Problem(courses, with_errors=True) if all(c.errors.size for c in courses) else moments)
+
+
+def _fitted(asked: _Asked, joint: int, adjacent: int, level: float, linear_p_value: float) -> Dependence:
+    courses, problem, beside = asked.courses, asked.moments, asked.beside_errors
+    share = 0.0 if linear_p_value >= 1.0 - level else beside.share(beside.full, beside.linear)
     mean = _levels(problem, courses, problem.linear)
     shape = problem.linear if share < LEAST_SHARE else problem.full
     line = mean if shape is problem.linear else _levels(problem, courses, shape)
@@ -221,12 +257,6 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
         trial_std=line.spread,
         freedom=mean.freedom,
     )
-
-
-def _linear_law(problem: Problem, level: float) -> tuple[float, float]:
-    """Return the p value of the law without ratios, and what ratios change where that refuses it, beside what shared errors may do."""
-    p_value = problem.linear_law_p_value(problem.linear)
-    return p_value, 0.0 if p_value >= 1.0 - level else problem.share(problem.full, problem.linear)
 
 
 def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:

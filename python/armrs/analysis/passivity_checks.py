@@ -37,7 +37,7 @@ class Check:
 
 
 def muscles_silent(trials: Sequence[Trial]) -> Check:
-    """Judge muscle activity: every channel against its own median in the trial.
+    """Judge muscle activity that is not left out: every channel against its own median in the trial.
 
     A contraction as long as the whole trial cannot be seen this way: that needs the activity of a known effort to compare with.
     """
@@ -47,7 +47,8 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
     for trial in trials:
         width = max(1, round(WINDOW * trial.rate))
         for name, values in trial.emg.items():
-            size = np.abs(values[np.isfinite(values)])
+            judged = np.isfinite(values) & ~trial.active
+            size = np.abs(values[judged])
             if len(size) < 2 * width:
                 continue
             mean = np.convolve(size, np.full(width, 1.0 / width), mode="valid")
@@ -55,7 +56,7 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
             at = int(np.argmax(mean))
             ratio = float(mean[at]) / middle if middle > 0.0 else (np.inf if mean[at] > 0.0 else 0.0)
             if ratio > worst[0]:
-                worst = (ratio, name, trial.file, float(trial.t[0] + (at + 0.5 * width) / trial.rate))
+                worst = (ratio, name, trial.file, float(trial.t[judged][at + width // 2]))
     ratio, name, file, at_s = worst
     if ratio > RISE:
         return Check(

@@ -21,7 +21,7 @@ from ..tabular import Framed, Labelled, Series, Tidy, over_trials
 from ..telling import telling
 from . import files
 from .faults import faults_of
-from .muscle_activity import comparable, mark_activity
+from .muscle_activity import mark_activity
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
@@ -238,7 +238,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     return Dataset(
         name=name_of(path, description),
         model=model,
-        trials=comparable(marked),
+        trials=marked,
         force_on=description.force_on,
         sample_rate=description.sample_rate,
         subject=description.subject,

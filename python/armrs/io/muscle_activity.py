@@ -67,6 +67,7 @@ def mark_activity(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], list[str]
 def _applied(trials: Sequence[Trial], active: list[np.ndarray], lines: list[str]) -> tuple[tuple[Trial, ...], list[str]]:
     marked = []
     for trial, own in zip(trials, active, strict=True):
+        own = own & trial.valid
         valid = trial.valid & ~own
         if own.any():
             lines.append(f"{trial.file}: muscles are active for {float(own.sum()) * trial.dt:.2g} s; these samples are left out")
@@ -76,7 +77,7 @@ def _applied(trials: Sequence[Trial], active: list[np.ndarray], lines: list[str]
 
 
 def comparable(trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """Return trials in which what is active in one repeat of a movement is left out of all: repeats are compared sample by sample."""
+    """Return trials in which what is active in one repeat of a movement is left out of all: `gap` compares repeats sample by sample."""
     shared = []
     for trial in trials:
         active = np.zeros(len(trial), dtype=bool)

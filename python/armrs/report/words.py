@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
@@ -418,3 +419,8 @@ def reproduced(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
             print(textwrap.fill(item["ours"], 110, initial_indent="    ", subsequent_indent="    "))
     print("\n" + textwrap.fill(result["verdict"], 110))
     files_written(written[-1:])
+
+
+def with_joint_names(line: str, joints: Sequence[str]) -> str:
+    """Return a line in which joints have their names in place of their numbers."""
+    return re.sub(r"\bjoint ([1-9])\b", lambda found: joints[int(found[1]) - 1], line)

@@ -6,13 +6,15 @@ import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
 from .. import _armrs, checks
-from ..analysis import double_exponential, joint_coupling, passivity_checks, preconditioning, students_t, uncertainty
+from ..analysis import double_exponential, joint_coupling, low_pass, passivity_checks, preconditioning, repeated, students_t, uncertainty
 from ..errors import BadInput, Text
+from ..io import resample
 from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import FEWEST_SAMPLES, Trial
@@ -58,7 +60,7 @@ class TrialMoments:
     ----------
     trial : Trial
     q, qd : ndarray, shape (n, n_joints)
-        Low-passed angles and speeds [rad, rad/s].
+        Low-passed angles and speeds [rad, rad/s], also where muscles are active.
     moment : ndarray, shape (n, n_joints)
         Torque with which each joint resists [N m].
     inertial : ndarray, shape (n, n_joints)
@@ -368,31 +370,40 @@ def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments
         raise BadInput("columns", Text("neither forces nor joint torques"), "Fy_N and Fz_N, or tau1_Nm …", file=trial.file)
     model, n = dataset.model_of(trial.configuration), dataset.model.n_joints
     chain, unit = _armrs.Arm.from_model(model), _armrs.Arm.from_model(model.replace(gravity=1.0))
-    q, qd, moment, inertial, sign = (np.full((len(trial), n), np.nan) for _ in range(5))
+    q, qd, qdd, moment, inertial, sign = (np.full((len(trial), n), np.nan) for _ in range(6))
+    # Activity spoils torques and not the motion.
+    measured = _long_enough(resample.complete_pieces(trial.valid | trial.active))
+    for piece in measured:
+        q[piece], qd[piece], qdd[piece] = _armrs.smooth(np.ascontiguousarray(trial.q[piece]), trial.rate, cutoff)
+        usual = RESTING * np.percentile(np.abs(qd[piece]), 90.0, axis=0)
+        moving = np.where(np.abs(qd[piece]) > usual, np.sign(qd[piece]), 0.0)
+        sign[piece] = _armrs.smooth(np.ascontiguousarray(moving), trial.rate, cutoff)[0]
     seen = None if trial.force_on_arm is None else np.full((len(trial), 2), np.nan)
-    for piece in trial.pieces():
-        if piece.stop - piece.start < FEWEST_SAMPLES:
-            continue
-        angle, speed, acceleration = _armrs.smooth(np.ascontiguousarray(trial.q[piece]), trial.rate, cutoff)
+    for piece in measured:
+        smooth = partial(low_pass.over_gaps, known=trial.valid[piece], rate=trial.rate, cutoff=cutoff)
+        angle, speed, acceleration = q[piece], qd[piece], qdd[piece]
         gravity = chain.gravity(angle)
         torque = -gravity
         if trial.force_on_arm is not None:
-            force = _armrs.smooth(np.ascontiguousarray(trial.force_on_arm[piece]), trial.rate, cutoff)[0]
+            force = smooth(trial.force_on_arm[piece])
             torque = torque + chain.static_torque(angle, force)
             if seen is not None:
                 seen[piece] = force
         if trial.moment_on_arm is not None:  # it turns every joint alike
-            torque = torque + _armrs.smooth(np.ascontiguousarray(trial.moment_on_arm[piece, None]), trial.rate, cutoff)[0]
+            torque = torque + smooth(trial.moment_on_arm[piece, None])
         if trial.tau is not None:
-            torque = torque + _armrs.smooth(np.ascontiguousarray(trial.tau[piece]), trial.rate, cutoff)[0]
+            torque = torque + smooth(trial.tau[piece])
         inertial[piece] = chain.inverse_dynamics(angle, speed, acceleration) - gravity
         if trial.base is not None:
             inertial[piece] += _carried(unit, angle, _armrs.smooth(np.ascontiguousarray(trial.base[piece]), trial.rate, cutoff)[2])
-        q[piece], qd[piece], moment[piece] = angle, speed, torque - inertial[piece]
-        usual = RESTING * np.percentile(np.abs(speed), 90.0, axis=0)
-        moving = np.where(np.abs(speed) > usual, np.sign(speed), 0.0)
-        sign[piece] = _armrs.smooth(np.ascontiguousarray(moving), trial.rate, cutoff)[0]
-    return TrialMoments(trial, q, qd, moment, inertial, _direction(q, qd, round(MARGIN * trial.rate / cutoff)), seen, sign)
+        moment[piece] = torque - inertial[piece]
+    moment[~trial.valid] = np.nan
+    direction = _direction(q, qd, np.isfinite(moment), round(MARGIN * trial.rate / cutoff))
+    return TrialMoments(trial, q, qd, moment, inertial, direction, seen, sign)
+
+
+def _long_enough(pieces: Sequence[slice]) -> list[slice]:
+    return [piece for piece in pieces if piece.stop - piece.start >= FEWEST_SAMPLES]
 
 
 def _carried(unit: _armrs.Arm, q: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
@@ -404,10 +415,10 @@ def _carried(unit: _armrs.Arm, q: np.ndarray, acceleration: np.ndarray) -> np.nd
     return np.asarray(acceleration[:, :1] * unit.gravity(turned) + acceleration[:, 1:] * unit.gravity(q))
 
 
-def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
+def _direction(q: np.ndarray, qd: np.ndarray, known: np.ndarray, margin: int) -> np.ndarray:
     """Tell in which direction each joint moves; one that is held rests, whatever its noise.
 
-    `margin` samples beside every reversal count as rest: there the low-pass mixes both directions.
+    `margin` samples beside every reversal count as rest: there the low-pass mixes both directions. So do those of unknown moment.
     """
     result = np.zeros(q.shape, dtype=int)
     for j in range(q.shape[1]):
@@ -417,7 +428,7 @@ def _direction(q: np.ndarray, qd: np.ndarray, margin: int) -> np.ndarray:
         least = MOVING * np.percentile(np.abs(qd[there, j]), 90.0)
         signs = np.where(there & (np.abs(qd[:, j]) > least), np.sign(qd[:, j]), 0.0)
         for sign in (-1, 1):
-            result[_deep_inside(signs == sign, margin), j] = sign
+            result[_deep_inside(signs == sign, margin) & known[:, j], j] = sign
     return result
 
 
@@ -439,9 +450,8 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     if angles.size == 0:
         return None
     edges = np.linspace(angles.min(), angles.max(), bins + 1)
-    rising, falling = (np.array([_at_centres(m, joint, sign, edges) for m in repeats]) for sign in (1, -1))
     # A friction that turns with the speed went through the same low-pass as its sign did.
-    ups, downs = (np.array([_binned(m, m.sign[:, joint], joint, sign, edges) for m in repeats]) for sign in (1, -1))
+    (rising, ups), (falling, downs) = (_sides(repeats, joint, sign, edges) for sign in (1, -1))
     half_width = (rising - falling) / (ups - downs)
     elastic = 0.5 * (rising + falling - half_width * (ups + downs))
     if not np.isfinite(elastic).any():
@@ -457,16 +467,16 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
         joint=joint + 1,
         repeats=int(np.isfinite(elastic).any(axis=1).sum()),
         angle=0.5 * (edges[1:] + edges[:-1]),
-        rising=_mean(rising) + kept,
-        falling=_mean(falling) + kept,
-        elastic=_mean(elastic) + kept,
-        elastic_std=_deviation(elastic) + kept,
-        half_width=_mean(half_width) + kept,
-        half_width_std=_deviation(half_width) + kept,
+        rising=repeated.mean(rising) + kept,
+        falling=repeated.mean(falling) + kept,
+        elastic=repeated.mean(elastic) + kept,
+        elastic_std=repeated.deviation(elastic) + kept,
+        half_width=repeated.mean(half_width) + kept,
+        half_width_std=repeated.deviation(half_width) + kept,
         inertial_share=float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2))),
         elastic_repeats=elastic,
         half_width_repeats=half_width,
-        held=np.array([_mean(m.q) for m in repeats]),
+        held=np.array([repeated.mean(m.q) for m in repeats]),
         elastic_systematic=uncertainty.by_jacobian(systematic[0]),
         half_width_systematic=uncertainty.by_jacobian(systematic[1]),
         elastic_errors=systematic[0],
@@ -477,7 +487,7 @@ def _systematic(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, e
     """Return what errors that all samples of all repeats share do to elastic mean and half width, each (n_errors, n_bins)."""
     deviations = uncertainty.Deviations.of(dataset)
     parts = [_shifts(dataset, m, joint, edges, deviations) for m in repeats]
-    rising, falling = (np.array([_mean(np.array(errors)) for errors in zip(*(part[k] for part in parts), strict=True)]) for k in (0, 1))
+    rising, falling = (np.array([repeated.mean(errors) for errors in np.stack([part[k] for part in parts], axis=1)]) for k in (0, 1))
     return 0.5 * (rising + falling), 0.5 * (rising - falling)
 
 
@@ -497,7 +507,7 @@ def _shifts(
 
 def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependence, ...]:
     """Fit every joint that moved in several configurations against the joint next to it, the one before where there are two."""
-    found = []
+    found: dict[tuple[int, int], list[double_exponential.Course]] = {}
     for joint in sorted({c.joint for c in curves}):
         own = [c for c in curves if c.joint == joint and _led_by(c)]
         n = own[0].held.shape[1] if own else 1
@@ -512,15 +522,21 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependen
                     known = np.nan_to_num(curve.elastic_errors[:, there].T)
                     course = (curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration, known)
                     courses.append(double_exponential.Course(*course))
-        fitted = joint_coupling.fit(courses, joint, adjacent, LEVEL)
-        if fitted is not None:
-            found.append(fitted)
-    return tuple(found)
+        found[joint, adjacent] = courses
+    return joint_coupling.fit_joints(found, LEVEL)
 
 
 def _led_by(curve: PassiveCurve) -> bool:
     """Whether the joint moves far enough to tell a shape."""
     return bool(np.ptp(curve.angle) > joint_coupling.LEAST_HELD)
+
+
+def _sides(repeats: Sequence[TrialMoments], joint: int, sign: int, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the moments of repeats in one direction, and the low-passed sign of the speed, by angle bin, each (repeats, bins)."""
+    broken = np.array([not m.trial.valid.all() for m in repeats])
+    moments = np.array([_at_centres(m, joint, sign, edges) for m in repeats])
+    signs = np.array([_binned(m, m.sign[:, joint], joint, sign, edges) for m in repeats])
+    return repeated.completed(moments, broken), repeated.completed(signs, broken)
 
 
 def _binned(moments: TrialMoments, values: np.ndarray, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
@@ -546,27 +562,12 @@ def _at_centres(moments: TrialMoments, joint: int, sign: int, edges: np.ndarray)
     return mean
 
 
-def _mean(values: np.ndarray) -> np.ndarray:
-    """Return the mean over repeats of those that have samples."""
-    there = np.isfinite(values)
-    count = there.sum(axis=0)
-    return np.where(count > 0, np.where(there, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
-
-
-def _deviation(values: np.ndarray) -> np.ndarray:
-    """Return the standard deviation over repeats; NaN where fewer than two have samples."""
-    there = np.isfinite(values)
-    count = there.sum(axis=0)
-    square = np.where(there, values - _mean(values), 0.0) ** 2
-    return np.where(count > 1, np.sqrt(square.sum(axis=0) / np.maximum(count - 1, 1)), np.nan)
-
-
 def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
     """Return what is odd in the trials of one configuration, a line each: none of it proves an error, and all of it spoils the means."""
     lines = []
     telling = [m for m in repeats if m.direction.any()]
     for m in repeats:
-        there = np.isfinite(m.q).all(axis=1)
+        there = np.isfinite(m.moment).all(axis=1)
         # Where no repeat tells, it is the movement and not a sensor, and that its joints are left out says so.
         if telling and not m.direction.any():
             lines.append(
@@ -580,7 +581,7 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
             lines.append(
                 f"{m.trial.file}: the force carries {100 * share:.2g} % of the arm's weight: is it in N, and force_on the right side?"
             )
-    places = np.array([_mean(m.q) for m in repeats])
+    places = np.array([repeated.mean(m.q) for m in repeats])
     for j, at in enumerate(places[np.isfinite(places).all(axis=1)].T, start=1):
         if at.size and np.ptp(at) > APART:
             where = f"{repeats[0].trial.configuration}: its repeats have joint {j} up to {np.degrees(np.ptp(at)):.3g}° apart"

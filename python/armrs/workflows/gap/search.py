@@ -10,6 +10,7 @@ from ... import _armrs, checks
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
+from ...io.muscle_activity import comparable
 from ...telling import telling
 from . import maps, separating, suspicion
 from .core_input import core_settings, core_trials, is_led
@@ -58,6 +59,7 @@ def find_gap(
     instead; the first of the warnings says so.
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    dataset = dataset.replace(trials=comparable(dataset.trials))
     checks.flag("separate", separate)
     if progress is not None:
         checks.function("progress", progress)

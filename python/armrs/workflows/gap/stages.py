@@ -15,6 +15,7 @@ from ..._armrs import Absorbed, ChannelGap, Place, Suspect
 from ...custom_effects import OwnEffect
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset, load_dataset, naming_trials
+from ...io.muscle_activity import comparable
 from ...model import Model
 from ...report.figures import shown
 from ...report.plain import data_of, origin
@@ -197,7 +198,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> Mapping[str, Cha
     data = result.dataset if dataset is None else _loaded(dataset, result.dataset.model)
     led = is_led(data)
     tests = data.test_trials or data.trials
-    data = data.replace(trials=tuple(tests))
+    data = data.replace(trials=comparable(tests))
     columns, settings = [replace(t, role="fit") for t in core_trials(data)], core_settings(data, led, 1)
     model, found = result.dataset.model, result.result
     return _armrs.confirmed(
