@@ -31,7 +31,8 @@ pub(super) fn slope_into(slope: &mut [f64], residual: &[f64], other: &[f64], cha
 }
 
 impl<const N: usize> Session<N> {
-    /// Angles that the encoders would read of the arm left to itself or to its motors, `[joint][sample]`; empty for a led arm.
+    /// Angles that the encoders would read of the arm left to itself or to its motors, `[joint][sample]`; empty for an arm that is led, by
+    /// a robot or whatever else its contact is with: without the path that holds it, it falls.
     ///
     /// Samples that no run reaches (next to gaps, and in pieces shorter than a quarter of a second) are not a number.
     ///
@@ -42,7 +43,7 @@ impl<const N: usize> Session<N> {
         hypothesis: &Hypothesis<N>,
         (trial, course): (usize, &Course<N>),
     ) -> Result<Channels, SimulationError> {
-        if self.comparison == ComparisonMode::Led {
+        if self.comparison == ComparisonMode::Led || self.reads_contact() {
             return Ok(Vec::new());
         }
         let (trial, rate) = (&self.trials[trial], course.rate);
