@@ -206,7 +206,8 @@ def copied(data: Dataset, into: str, source: str, *, length: int | None = None, 
     by_name = {t.file: t for t in data.trials}
     taken = {name: getattr(by_name[source], name)[:length].copy() for name in ("t", "q", "force_on_arm", "robot_q")}
     taken |= {name: change(taken[name]) for name, change in columns.items()}
-    copy = dataclasses.replace(by_name[into], valid=np.empty(0, dtype=bool), **taken)
+    unknown = np.empty(0, dtype=bool)
+    copy = dataclasses.replace(by_name[into], valid=unknown, active=unknown, **taken)
     return data.replace(trials=tuple(copy if t.file == into else t for t in data.trials))
 
 

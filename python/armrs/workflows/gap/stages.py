@@ -198,7 +198,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> Mapping[str, Cha
     data = result.dataset if dataset is None else _loaded(dataset, result.dataset.model)
     led = is_led(data)
     tests = data.test_trials or data.trials
-    data = data.replace(trials=comparable(tests))
+    data = data.replace(trials=tests)
     columns, settings = [replace(t, role="fit") for t in core_trials(data)], core_settings(data, led, 1)
     model, found = result.dataset.model, result.result
     return _armrs.confirmed(
@@ -213,4 +213,5 @@ def confirm(result: GapFound, dataset: Source | None = None) -> Mapping[str, Cha
 def _loaded(dataset: Source, model: Model | None) -> Dataset:
     data = checks.loaded("dataset", dataset, Dataset, load_dataset)
     checks.instance("model", model, Model, type(None))
+    data = data.replace(trials=comparable(data.trials))
     return data if model is None else data.replace(model=model)
