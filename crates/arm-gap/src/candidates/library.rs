@@ -170,7 +170,7 @@ fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<u
     // weight or an inertia could as well be.
     let swings_freely = session.swings_freely();
     // Torques of a contact are told with the lengths: where no path of a robot tells these, a wrong one looks like a wrong weight.
-    let lengths_tell = led || !session.reads_contact();
+    let lengths_tell = !session.compares_contact_torques();
     match kind.info().place {
         Place::Segment if !lengths_tell && lengthens(kind) => 0..0,
         Place::Segment | Place::Hand | Place::Frame | Place::Base if swings_freely => 0..0,

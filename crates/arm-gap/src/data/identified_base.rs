@@ -236,9 +236,13 @@ impl<const N: usize> Session<N> {
     /// Joints that move and are held all the same, from 0: what resists them is far above any viscosity.
     pub fn held_in_motion(&self) -> Vec<usize> {
         let held = |law: &&Passive| law.likely && law.free.is_empty();
-        let reach = self.reach();
         let held = self.base.iter().filter(held).map(|law| law.effect.index);
-        held.filter(|&joint| reach[joint] > STILL).collect()
+        let mut held: Vec<usize> = held.collect();
+        if !held.is_empty() {
+            let reach = self.reach();
+            held.retain(|&joint| reach[joint] > STILL);
+        }
+        held
     }
 
     /// A law with what is known of its numbers beforehand.

@@ -8,7 +8,6 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::GapError;
 use crate::data::noise::{Noise, Thinned, dot};
 use crate::data::prepared_session::PreparedSession;
-use crate::data::session::ComparisonMode;
 use crate::measurement_model::prediction::Channels;
 use crate::selection::fit::{Fitted, decided};
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -135,8 +134,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             .collect();
         // The torques of one force vary together. What they leave over between them, no noise of the force is in: it would count most, and
         // there the noise of speeds makes all that resists too small.
-        let apart =
-            self.session.reads_contact() && self.session.comparison == ComparisonMode::Torque;
+        let apart = self.session.compares_contact_torques();
         let of = |deviations: &[Thinned], taken: &[Thinned]| {
             let noise = Noise::of(deviations, taken, range, told)?;
             Ok::<_, GapError>(if apart { noise.apart() } else { noise })

@@ -76,10 +76,16 @@ impl<const N: usize> Session<N> {
         }
     }
 
-    /// Whether a contact alone moves the arm, and a sensor reads its force in every trial.
-    pub fn reads_contact(&self) -> bool {
+    /// Whether torques are compared that a contact alone exerts, whose force a sensor reads in every trial.
+    pub fn compares_contact_torques(&self) -> bool {
         let mut trials = self.trials.iter();
-        trials.all(|t| t.force_on_arm.is_some() && t.torque.is_none())
+        self.comparison == ComparisonMode::Torque
+            && trials.all(|t| t.force_on_arm.is_some() && t.torque.is_none())
+    }
+
+    /// Whether what a sensor reads of a contact is compared, as a force or as the torques of one.
+    pub fn reads_contact(&self) -> bool {
+        self.comparison == ComparisonMode::Led || self.compares_contact_torques()
     }
 
     /// Trials on which things are chosen and fitted.
@@ -284,6 +290,30 @@ impl<const N: usize> Session<N> {
 mod tests {
     use super::*;
     use crate::measurement_model::prediction::tests::resting;
+
+    #[test]
+    fn the_force_of_a_led_arm_is_read_whether_or_not_torques_were_recorded_beside_it() {
+        let mut session = resting(100.0);
+        let asked = |session: &Session<2>| {
+            let torques = session.compares_contact_torques();
+            (
+                session.reads_contact(),
+                torques,
+                session.given().calibration.len(),
+                session.by_trial().len(),
+            )
+        };
+        let led = asked(&session);
+        assert!(led.0 && !led.1);
+        session.comparison = ComparisonMode::Torque;
+        // Of a contact alone the same sensors are read; where the robot's base stands is no question.
+        assert_eq!(asked(&session), (true, true, led.2, led.3 - 2));
+        session.trials[0].torque = Some(vec![arm_core::Joints::zeros(); 200]);
+        // Angle sensors alone.
+        assert_eq!(asked(&session), (false, false, 2, 0));
+        session.comparison = ComparisonMode::Led;
+        assert_eq!(asked(&session), led);
+    }
 
     #[test]
     fn what_was_never_exact_is_free_within_four_standard_deviations() {

@@ -8,7 +8,7 @@ use arm_numerics::{Cholesky, Matrix};
 use arm_sim::{Drive, Experiment, Interpolation, Series, SimulationError, Start, simulate};
 
 use crate::data::noise::dot;
-use crate::data::session::{ComparisonMode, Session};
+use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::joint_torques::{offsets, unbent};
 use crate::measurement_model::prediction::{Channels, Course, STEPS};
@@ -43,7 +43,7 @@ impl<const N: usize> Session<N> {
         hypothesis: &Hypothesis<N>,
         (trial, course): (usize, &Course<N>),
     ) -> Result<Channels, SimulationError> {
-        if self.comparison == ComparisonMode::Led || self.reads_contact() {
+        if self.reads_contact() {
             return Ok(Vec::new());
         }
         let (trial, rate) = (&self.trials[trial], course.rate);

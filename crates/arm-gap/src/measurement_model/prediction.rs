@@ -173,7 +173,7 @@ impl<const N: usize> Session<N> {
     /// [`GapError::Numerics`] for a trial too short for the filters.
     fn band(&self, rate: f64) -> Result<f64, GapError> {
         let band = BAND.min(0.2 * rate);
-        if self.comparison == ComparisonMode::Led || !self.reads_contact() {
+        if !self.compares_contact_torques() {
             return Ok(band);
         }
         let trials: Vec<&Trial<N>> = self.trials.iter().collect();
