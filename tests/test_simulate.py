@@ -57,6 +57,41 @@ def test_writes_every_column_with_its_unit(slow_arm: Path, tmp_path: Path, capsy
         assert np.allclose(left, columns[f"drive{j}_Nm"] + columns[f"contact{j}_Nm"], atol=1e-9)
 
 
+def test_a_step_found_for_an_accuracy_keeps_it(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Against a run of a step eight times shorter; command and function find the same step and have the same bits."""
+    model, movement = slow_arm / "truth.toml", slow_arm / "movement.toml"
+    path = armrs.load_movement(movement, 2)
+    for accuracy in (1e-4, 1e-7):
+        found = armrs.simulate(model, path, accuracy=accuracy)
+        fine = armrs.simulate(model, path, dt=found.settings["dt_s"] / 8)
+        assert np.abs(found.q - fine.q).max() <= accuracy
+        assert found.settings["angle_error_rad"] <= found.settings["accuracy_rad"] == accuracy
+    assert run("simulate", model, "--movement", movement, "--accuracy-rad", "1e-7", "-o", tmp_path / "out") == 0
+    assert "angles right to about" in capsys.readouterr().out
+    written = json.loads((tmp_path / "out" / "simulated.json").read_text())
+    assert (written["digest"], written["dt_s"]) == (found.digest, found.settings["dt_s"])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"accuracy": 0.0},
+        {"accuracy": float("nan")},
+        {"accuracy": 1e-6, "dt": 1e-3},
+        {"accuracy": 1e-6, "engine": "rapier"},
+        {"accuracy": 1e-6, "integrator": "euler"},
+    ],
+)
+def test_an_accuracy_that_cannot_be_kept_is_refused(slow_arm: Path, options: dict[str, Any]) -> None:
+    with pytest.raises(BadInput, match="accuracy"):
+        armrs.simulate(slow_arm / "truth.toml", duration=1.0, **options)
+
+
+def test_an_accuracy_beyond_rounding_is_refused(slow_arm: Path) -> None:
+    with pytest.raises(armrs.SimulationError, match="a shorter step than 1e-6 s is not tried"):
+        armrs.simulate(slow_arm / "truth.toml", duration=0.2, accuracy=1e-22)
+
+
 def test_json_accounts_for_the_energy(slow_arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("simulate", slow_arm / "truth.toml", "--movement", slow_arm / "movement.toml", "--json", "-") == 0
     result = json.loads(capsys.readouterr().out)

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .io.trial import Trial
+from .workflows.driven import CoreDrive, CoreRun
 from .workflows.gap.core_input import SearchSettings
 from .workflows.identify import CoreSettings
 from .workflows.movement import Movement
 from .workflows.plan import Instruments, Limits
-from .workflows.simulate import CoreDrive, CoreRun, Sensors
+from .workflows.simulate import Sensors
 
 __all__ = [
     "DECISIONS",
@@ -1661,6 +1662,14 @@ def simulate(
     settings: CoreRun,
     sensing: tuple[Sensors, Sequence[int]] | None = None,
 ) -> Recording: ...
+def simulate_accurately(
+    rig: Rig,
+    drive: CoreDrive,
+    settings: CoreRun,
+    accuracy: float,
+    sensing: tuple[Sensors, Sequence[int]] | None = None,
+) -> tuple[Recording, float, float]: ...
+def resolve(rig: Rig, drive: CoreDrive, settings: CoreRun, accuracy: float) -> tuple[float, float]: ...
 def simulate_in_pieces(rig: Rig, drive: CoreDrive, settings: CoreRun, samples: int, take: Callable[[Recording], None]) -> None: ...
 def smooth(
     values: NDArray[np.float64], rate: float, cutoff: float

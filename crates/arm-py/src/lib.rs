@@ -43,6 +43,8 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("STILL", arm_gap::data::identified_base::STILL)?;
     m.add_function(wrap_pyfunction!(own::declare, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate, m)?)?;
+    m.add_function(wrap_pyfunction!(sim::simulate_accurately, m)?)?;
+    m.add_function(wrap_pyfunction!(sim::resolve, m)?)?;
     m.add_function(wrap_pyfunction!(sim::simulate_in_pieces, m)?)?;
     m.add_function(wrap_pyfunction!(lab::control, m)?)?;
     m.add_function(wrap_pyfunction!(lab::interact, m)?)?;

@@ -117,18 +117,81 @@ pub fn simulate<'py>(
         let engine = settings.engine()?;
         let outcome = py.detach(|| arm_sim::simulate_with(engine, &experiment));
         crate::own::failed()?;
-        let recording = outcome.map_err(simulation)?;
-        let mut readings = Vec::new();
-        if let Some((sensing, seeds)) = sensing {
-            for &seed in seeds {
-                let sensors = sensing.sensors::<N>(seed);
-                let read = sensors.read(&experiment, &recording);
-                readings.push(Readings::of(py, &read.map_err(simulation)?)?);
-            }
-        }
-        Recorded::of(py, &Piece::from(&recording), readings)
+        recorded(py, &experiment, &outcome.map_err(simulation)?, sensing)
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
+}
+
+/// A recording, and what sensors read of it.
+fn recorded<const N: usize>(
+    py: Python<'_>,
+    experiment: &Experiment<N>,
+    recording: &arm_sim::Recording<N>,
+    sensing: Option<&(Sensing, Vec<u64>)>,
+) -> PyResult<Recorded> {
+    let mut readings = Vec::new();
+    if let Some((sensing, seeds)) = sensing {
+        for &seed in seeds {
+            let sensors = sensing.sensors::<N>(seed);
+            let read = sensors.read(experiment, recording);
+            readings.push(Readings::of(py, &read.map_err(simulation)?)?);
+        }
+    }
+    Recorded::of(py, &Piece::from(recording), readings)
+}
+
+/// Simulates an experiment so that angles are right to an accuracy [rad]; the recording, its step [s] and the estimated error [rad].
+#[pyfunction]
+#[pyo3(signature = (rig, drive, settings, accuracy, sensing=None))]
+pub fn simulate_accurately<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    drive: Driven<'py>,
+    settings: Settings,
+    accuracy: f64,
+    sensing: Option<(Sensing, Vec<u64>)>,
+) -> PyResult<(Recorded, f64, f64)> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (drive, settings, accuracy): (&Driven<'py>, &Settings, f64),
+        sensing: Option<&(Sensing, Vec<u64>)>,
+    ) -> PyResult<(Recorded, f64, f64)> {
+        let mut experiment = experiment(chain, rig, drive, settings)?;
+        let one = std::slice::from_ref(&experiment);
+        let outcome = py.detach(|| arm_sim::simulate_accurately(one, accuracy, 1).remove(0));
+        crate::own::failed()?;
+        let (recording, resolved) = outcome.map_err(simulation)?;
+        experiment.dt = resolved.dt;
+        let recorded = recorded(py, &experiment, &recording, sensing)?;
+        Ok((recorded, resolved.dt, resolved.error))
+    }
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, accuracy), sensing.as_ref()))
+}
+
+/// The step [s] of [`simulate_accurately`] and the estimated error [rad]; no recording is kept.
+#[pyfunction]
+pub fn resolve<'py>(
+    py: Python<'py>,
+    rig: &Rig,
+    drive: Driven<'py>,
+    settings: Settings,
+    accuracy: f64,
+) -> PyResult<(f64, f64)> {
+    fn run<'py, const N: usize>(
+        py: Python<'py>,
+        chain: &Chain<f64, N>,
+        rig: &Rig,
+        (drive, settings, accuracy): (&Driven<'py>, &Settings, f64),
+    ) -> PyResult<(f64, f64)> {
+        let experiment = experiment(chain, rig, drive, settings)?;
+        let outcome = py.detach(|| arm_sim::resolve(&experiment, accuracy));
+        crate::own::failed()?;
+        let resolved = outcome.map_err(simulation)?;
+        Ok((resolved.dt, resolved.error))
+    }
+    each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, accuracy)))
 }
 
 /// Simulates an experiment and calls `take` with the columns of every so many samples; what it raises ends the run.

@@ -12,7 +12,7 @@ use crate::native::{PlainSteps, diverged};
 use crate::plain::Plain;
 use crate::prepare::{Prepared, commands};
 use crate::recorder::{Instant, Recorder, Row};
-use crate::state::{BaseMotion, Input, State};
+use crate::state::{BaseMotion, Input, Outcome, State};
 use crate::step::{Inputs, Memory, step};
 use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
 use arm_core::simd_dispatch::{Computation, dispatch};
@@ -83,6 +83,7 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
     let kinds =
         |p: &Prepared<N>| -> Vec<_> { p.model.effects.iter().map(|e| (e.kind, e.index)).collect() };
     a.schedule == b.schedule
+        && a.experiment.columns == b.experiment.columns
         && a.integrator() == b.integrator()
         && discriminant(&a.model.link) == discriminant(&b.model.link)
         && a.model.base.is_some() == b.model.base.is_some()
@@ -143,7 +144,7 @@ struct Group<'a, const N: usize> {
     prepared: &'a [Prepared<'a, N>],
     setup: Setup<Wide, N>,
     model: Model<Wide, N>,
-    /// The rig, where it is plain and the integrator that of plain rigs.
+    /// The rig, where it is plain.
     plain: Option<Plain<Wide, N>>,
     /// Whether one drive, without displacement, is that of all lanes.
     one_drive: bool,
@@ -170,7 +171,7 @@ impl<'a, const N: usize> Group<'a, N> {
         model.heaves = first.model.heaves;
         Ok(Self {
             prepared,
-            plain: first.plain().and_then(|_| model.plain()),
+            plain: model.plain(),
             one_drive: prepared
                 .iter()
                 .all(|p| same_drive(p, first) && p.setup.is_as_commanded()),
@@ -202,12 +203,13 @@ impl<'a, const N: usize> Group<'a, N> {
         } else {
             pack_input(|i| in_lane(self.prepared, i).input(time))
         };
-        self.row.fill(&Instant {
+        let instant = Instant {
             model: &self.model,
             input: &input,
             state: &self.state,
             memory: &self.memory.state,
-        });
+        };
+        self.row.fill(&instant, self.prepared[0].experiment.columns);
         let recorders = self.recorders.iter_mut().zip(&self.stopped).enumerate();
         for (i, (recorder, stopped)) in recorders {
             if stopped.is_none() {
@@ -279,7 +281,7 @@ impl<'a, const N: usize> Group<'a, N> {
 /// What steps are made of, whatever drives them.
 struct Steps<'a, const N: usize> {
     model: &'a Model<Wide, N>,
-    /// The rig, where it is plain and the integrator that of plain rigs.
+    /// The rig, where it is plain.
     plain: Option<&'a Plain<Wide, N>>,
     integrator: Integrator,
     h: f64,
@@ -326,7 +328,7 @@ where
         };
         // A copy of which nobody else knows: without it the compiler must fear that the rig changes with the state.
         let (rig, h) = (*rig, steps.h);
-        Abreast { rig, ahead, h }.advance(ahead.steps, state)
+        Abreast { rig, ahead, h }.advance(steps.integrator, ahead.steps, state)
     }
 }
 
@@ -341,26 +343,53 @@ impl<T: Scalar, const N: usize> PlainSteps<Wide, N> for Abreast<'_, T, N>
 where
     Input<T, N>: Drives<N>,
 {
+    #[inline(always)]
+    fn h(&self) -> f64 {
+        self.h
+    }
+
     /// One loop over lanes around all of it, of which the compiler makes vectors.
     #[inline(always)]
-    fn step(&self, number: usize, state: &mut State<Wide, N>) {
-        let input = self.ahead.step(number).start;
+    fn first_order(&self, step: usize, state: &mut State<Wide, N>) {
+        let input = self.ahead.step(step).start;
         let pose = Pose::new(&state.q);
         // Into another place: what a lane writes is nothing that another one reads.
         let mut next = *state;
         for i in 0..LANES {
             let mut lane = state.lane(i);
             let rig = self.rig.lane(i);
-            let now = rig.evaluate(&input.handle(i), &pose.lane(i), &lane);
+            let now = rig.evaluate(&input.handle(i), &pose.lane(i), [&lane.q, &lane.qd]);
             lane.advance(self.h, &now);
             next.set_lane(i, &lane);
         }
         *state = next;
     }
+
+    #[inline(always)]
+    fn evaluate(
+        &self,
+        step: usize,
+        stage: usize,
+        [q, qd]: [&Joints<Wide, N>; 2],
+    ) -> Outcome<Wide, N> {
+        // Copies of which nobody else knows, as of the rig.
+        let (input, q, qd) = (*self.ahead.step(step).at_stage(stage), *q, *qd);
+        let pose = Pose::new(&q);
+        let mut all = Outcome::none();
+        for i in 0..LANES {
+            let rig = self.rig.lane(i);
+            // Not by `map`, which would copy every lane.
+            let q = Joints::from_fn(|j, _| q[j].0[i]);
+            let qd = Joints::from_fn(|j, _| qd[j].0[i]);
+            let one = rig.evaluate(&input.handle(i), &pose.lane(i), [&q, &qd]);
+            all.set_lane(i, &one);
+        }
+        all
+    }
 }
 
 /// What drives all lanes, the same for each or not.
-trait Drives<const N: usize> {
+trait Drives<const N: usize>: Copy {
     fn wide(&self) -> Input<Wide, N>;
     /// The handle of one lane.
     fn handle(&self, lane: usize) -> Handle<f64>;

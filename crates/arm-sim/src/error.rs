@@ -110,6 +110,18 @@ pub enum SimulationError {
         /// What a newton metre of it adds to it \[N m\].
         gain: f64,
     },
+    /// An accuracy that no step reaches which is not too short.
+    #[error(
+        "the angles are right to within {reached:.2e} rad at a step of {dt:.3e} s, asked are {asked:e} rad, and a shorter step than 1e-6 s is not tried"
+    )]
+    Accuracy {
+        /// Accuracy asked for \[rad\].
+        asked: f64,
+        /// Estimated error at the shortest step \[rad\].
+        reached: f64,
+        /// That step \[s\].
+        dt: f64,
+    },
     /// More memory than there is.
     #[error("the result needs {} of memory, {}", Bytes(*needed), room(*available))]
     Memory {

@@ -33,6 +33,18 @@ pub struct Experiment<const N: usize> {
     pub integrator: Integrator,
     /// Time from one recorded sample to the next \[s\], a whole number of steps; `None` records every step.
     pub output_interval: Option<f64>,
+    /// What is recorded of each sample, [`Columns::All`] unless set.
+    pub columns: Columns,
+}
+
+/// What is recorded of each sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Columns {
+    /// Every column of a [`Recording`](crate::Recording).
+    All,
+    /// Time, angles and speeds; all other columns stay empty. Where samples are close together, computing the others takes
+    /// longer than the steps.
+    Motion,
 }
 
 impl<const N: usize> Experiment<N> {
@@ -52,6 +64,7 @@ impl<const N: usize> Experiment<N> {
             duration,
             integrator: Integrator::Rk4,
             output_interval: None,
+            columns: Columns::All,
         }
     }
 

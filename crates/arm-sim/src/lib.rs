@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod accuracy;
 mod batch;
 mod controlled;
 mod coupled;
@@ -37,12 +38,13 @@ mod step;
 mod stepper;
 mod supervisor;
 mod terms;
+pub use accuracy::{Resolved, resolve, simulate_accurately};
 #[doc(hidden)]
 pub use batch::simulate_batch;
 pub use controlled::{Controlled, Controller, Fault, control};
 pub use digest::{Digest, definite, digest, digest_of};
 pub use error::{NoRest, SimulationError};
-pub use experiment::{Coupling, Drive, Experiment, Integrator, Start, altered};
+pub use experiment::{Columns, Coupling, Drive, Experiment, Integrator, Start, altered};
 pub use interaction::{Interaction, Law, Support, Yielded, interact};
 pub use linearized::{Change, Slopes};
 pub use movement::{JointMotion, Movement};

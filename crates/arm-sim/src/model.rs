@@ -110,6 +110,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         })
     }
 
+    /// Whether nothing in it bends or jumps: no dry friction, no play, no effect but those linear in the motion of their joint.
+    pub fn is_smooth(&self) -> bool {
+        let has_play = matches!(&self.link, Link::Compliant(contact) if !contact.has_no_play());
+        !self.has_dry && !has_play && self.others.is_empty()
+    }
+
     /// The rig, where it is a plain one.
     pub fn plain(&self) -> Option<Plain<T, N>> {
         match &self.link {

@@ -6,12 +6,12 @@ use crate::input_buffer::{Ahead, InputBuffer};
 use crate::plain::Plain;
 use crate::prepare::Prepared;
 use crate::recorder::{Instant, Pieces, Recorder, Row};
-use crate::state::State;
-use crate::step::Memory;
-use crate::{Experiment, Partial, SimulationError};
+use crate::state::{Outcome, State};
+use crate::step::{Memory, Stages, fourth_order};
+use crate::{Experiment, Integrator, Partial, SimulationError};
 use arm_core::effect::States;
 use arm_core::simd_dispatch::{Computation, dispatch};
-use arm_core::{Pose, Scalar};
+use arm_core::{Joints, Pose, Scalar};
 
 /// Runs an experiment, recorded as a whole or in pieces; the loop does not allocate.
 pub(crate) fn run<const N: usize>(
@@ -29,17 +29,18 @@ pub(crate) fn run<const N: usize>(
     };
     let mut row = Row::new();
     let mut sample = |steps: usize, state: &State<f64, N>, memory: &[States<f64>]| {
-        row.fill_solved(&Instant {
+        let instant = Instant {
             model: &prepared.model,
             input: &prepared.input(schedule.time(steps)),
             state,
             memory,
-        });
+        };
+        row.fill_solved(&instant, experiment.columns);
         recorder.push(&row, |value| *value)
     };
     let mut wanted = sample(0, &state, &memory.state).is_continue();
     let mut feed = InputBuffer::new(prepared.integrator());
-    let plain = prepared.plain();
+    let plain = prepared.model.plain();
     let mut stopped = None;
     let mut broken = prepared.discontinuities.steps().peekable();
     let (mut done, mut sampled) = (0, 0);
@@ -80,7 +81,7 @@ pub(crate) fn run<const N: usize>(
 /// Some steps, to the end or to the first after which the state is not finite.
 struct Steps<'a, const N: usize> {
     prepared: &'a Prepared<'a, N>,
-    /// The rig, where it is plain and the integrator that of plain rigs.
+    /// The rig, where it is plain.
     plain: Option<&'a Plain<f64, N>>,
     ahead: Ahead<'a, f64, N>,
     at: (&'a mut State<f64, N>, &'a mut Memory<f64>),
@@ -110,26 +111,45 @@ impl<const N: usize> Computation for Steps<'_, N> {
             return ahead.steps;
         };
         let rig = *rig;
-        Alone { rig, ahead, h }.advance(ahead.steps, state)
+        Alone { rig, ahead, h }.advance(prepared.integrator(), ahead.steps, state)
     }
 }
 
 /// Steps of plain rigs. A trait, as closures cannot be made to be inlined.
 pub(crate) trait PlainSteps<T: Scalar, const N: usize> {
-    /// Makes one of them, counted from zero.
-    fn step(&self, number: usize, state: &mut State<T, N>);
+    /// Length of a step \[s\].
+    fn h(&self) -> f64;
 
-    /// Makes some, up to the first after which the state is not finite; returns their number.
+    /// One step of [`Integrator::SemiImplicitEuler`].
     ///
-    /// What is not finite stays so: it is looked for after all of them, and only where there is any they are made again one by
-    /// one.
+    /// * `step` - counted from zero
+    fn first_order(&self, step: usize, state: &mut State<T, N>);
+
+    /// What follows from angles and speeds at a stage of a step of [`Integrator::Rk4`].
+    fn evaluate(&self, step: usize, stage: usize, state: [&Joints<T, N>; 2]) -> Outcome<T, N>;
+
+    /// Makes some steps, up to the first after which the state is not finite; returns their number.
     #[inline(always)]
-    fn advance(&self, steps: usize, state: &mut State<T, N>) -> usize {
+    fn advance(&self, integrator: Integrator, steps: usize, state: &mut State<T, N>) -> usize {
+        match integrator {
+            Integrator::SemiImplicitEuler => self.strides::<false>(steps, state),
+            Integrator::Rk4 => self.strides::<true>(steps, state),
+        }
+    }
+
+    /// What is not finite stays so: it is looked for after all of the steps, and only where there is any they are made again one
+    /// by one.
+    #[inline(always)]
+    fn strides<const FOURTH: bool>(&self, steps: usize, state: &mut State<T, N>) -> usize {
         let (mut made, mut stride) = (0, if state.is_finite() { steps } else { 1 });
         while made < steps {
             let mut now = *state;
-            for number in made..made + stride {
-                self.step(number, &mut now);
+            for step in made..made + stride {
+                if FOURTH {
+                    fourth_order(self.h(), &mut now, &mut Step { of: self, step });
+                } else {
+                    self.first_order(step, &mut now);
+                }
             }
             let finite = now.is_finite();
             if finite || stride == 1 {
@@ -147,6 +167,19 @@ pub(crate) trait PlainSteps<T: Scalar, const N: usize> {
     }
 }
 
+/// One of some steps.
+struct Step<'a, P: ?Sized> {
+    of: &'a P,
+    step: usize,
+}
+
+impl<T: Scalar, P: PlainSteps<T, N> + ?Sized, const N: usize> Stages<T, N> for Step<'_, P> {
+    #[inline(always)]
+    fn evaluate(&mut self, stage: usize, q: &Joints<T, N>, qd: &Joints<T, N>) -> Outcome<T, N> {
+        self.of.evaluate(self.step, stage, [q, qd])
+    }
+}
+
 /// Steps of one plain rig.
 struct Alone<'a, const N: usize> {
     rig: Plain<f64, N>,
@@ -156,10 +189,22 @@ struct Alone<'a, const N: usize> {
 
 impl<const N: usize> PlainSteps<f64, N> for Alone<'_, N> {
     #[inline(always)]
-    fn step(&self, number: usize, state: &mut State<f64, N>) {
-        let handle = &self.ahead.step(number).start.handle;
-        let outcome = self.rig.evaluate(handle, &Pose::new(&state.q), state);
+    fn h(&self) -> f64 {
+        self.h
+    }
+
+    #[inline(always)]
+    fn first_order(&self, step: usize, state: &mut State<f64, N>) {
+        let handle = &self.ahead.step(step).start.handle;
+        let pose = Pose::new(&state.q);
+        let outcome = self.rig.evaluate(handle, &pose, [&state.q, &state.qd]);
         state.advance(self.h, &outcome);
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, step: usize, stage: usize, state: [&Joints<f64, N>; 2]) -> Outcome<f64, N> {
+        let handle = &self.ahead.step(step).at_stage(stage).handle;
+        self.rig.evaluate(handle, &Pose::new(state[0]), state)
     }
 }
 

@@ -6,7 +6,7 @@ use arm_core::{
 };
 
 use crate::Handle;
-use crate::state::{Outcome, State, difference, powers};
+use crate::state::{Outcome, difference, powers};
 
 /// A rig of which a step takes no decision: its base stands still, its tip is on springs and dampers without play, no motors
 /// turn its joints, and all that resists in these is linear in their motion.
@@ -21,15 +21,14 @@ pub(crate) struct Plain<T, const N: usize> {
 impl<T: Scalar, const N: usize> Plain<T, N> {
     /// As [`Model::evaluate`](crate::model::Model::evaluate), the same bits.
     ///
-    /// * `pose` - at `state.q`
+    /// * `pose` - at the angles `q`
     #[inline(always)]
     pub fn evaluate(
         &self,
         handle: &Handle<T>,
         pose: &Pose<T, N>,
-        state: &State<T, N>,
+        [q, qd]: [&Joints<T, N>; 2],
     ) -> Outcome<T, N> {
-        let State { q, qd, .. } = state;
         let (still, resisting) = (Joints::<T, N>::repeat(T::ZERO), affine(&self.affine, q, qd));
         let (at, v) = (tip(&self.chain, pose), tip_velocity(&self.chain, pose, qd));
         let (gap, rate) = apart(handle, at, v);

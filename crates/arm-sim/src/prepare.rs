@@ -9,13 +9,12 @@ use arm_core::{Joints, Setup};
 use crate::discontinuities::Discontinuities;
 use crate::error::finite;
 use crate::model::{Link, Model};
-use crate::plain::Plain;
 use crate::room::require_room;
 use crate::schedule::Schedule;
 use crate::state::{BaseMotion, Input};
 use crate::{
-    Coupling, Drive, Experiment, Handle, HandlePath, Integrator, JointMotion, SimulationError,
-    Start, stability, start,
+    Columns, Coupling, Drive, Experiment, Handle, HandlePath, Integrator, JointMotion,
+    SimulationError, Start, stability, start,
 };
 use arm_core::simd_dispatch::{Computation, dispatch};
 
@@ -86,9 +85,11 @@ impl<'a, const N: usize> Prepared<'a, N> {
         Ok(prepared)
     }
 
-    /// Whether the commanded motion of a robot is known.
-    pub fn has_robot(&self) -> bool {
-        self.experiment.robot.is_some() && matches!(self.experiment.drive, Drive::Handle { .. })
+    /// Whether the commanded motion of a robot is known and recorded.
+    pub fn records_robot(&self) -> bool {
+        self.experiment.robot.is_some()
+            && self.experiment.columns == Columns::All
+            && matches!(self.experiment.drive, Drive::Handle { .. })
     }
 
     /// Commanded robot motion at some samples; none without a robot.
@@ -118,13 +119,6 @@ impl<'a, const N: usize> Prepared<'a, N> {
         for input in &mut out[from..] {
             input.stands_as_in(&self.setup);
         }
-    }
-
-    /// The rig, where steps of semi-implicit Euler need take no decision.
-    pub fn plain(&self) -> Option<Plain<f64, N>> {
-        matches!(self.integrator(), Integrator::SemiImplicitEuler)
-            .then(|| self.model.plain())
-            .flatten()
     }
 
     pub fn integrator(&self) -> Integrator {
@@ -276,7 +270,8 @@ fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
     Ok(())
 }
 
-fn link<const N: usize>(
+/// How the tip of an experiment is held.
+pub(crate) fn link<const N: usize>(
     experiment: &Experiment<N>,
     setup: &Setup<f64, N>,
 ) -> Result<Link<f64>, SimulationError> {

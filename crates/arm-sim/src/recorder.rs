@@ -12,7 +12,7 @@ use crate::record::Piece;
 use crate::record::recorded_states;
 use crate::room::{require_room, reserve_room};
 use crate::state::{Input, Outcome, State, difference, sum};
-use crate::{Recording, SimulationError};
+use crate::{Columns, Recording, SimulationError};
 use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Forces of a state, by whatever engine.
@@ -60,9 +60,9 @@ pub(crate) struct Row<T>(Vec<T>);
 
 impl Row<f64> {
     /// An instant of the native engine, dry friction included.
-    pub fn fill_solved<const N: usize>(&mut self, instant: &Instant<f64, N>) {
-        if !instant.model.has_dry {
-            return self.fill(instant);
+    pub fn fill_solved<const N: usize>(&mut self, instant: &Instant<f64, N>, columns: Columns) {
+        if !instant.model.has_dry || columns == Columns::Motion {
+            return self.fill(instant, columns);
         }
         let State { q, qd, .. } = instant.state;
         let (outcome, friction) =
@@ -83,8 +83,22 @@ impl<T: Scalar> Row<T> {
     }
 
     /// An instant of the native engine without dry friction: forces follow from the model.
-    pub fn fill<const N: usize>(&mut self, instant: &Instant<T, N>) {
-        dispatch(Native { row: self, instant });
+    pub fn fill<const N: usize>(&mut self, instant: &Instant<T, N>, columns: Columns) {
+        match columns {
+            Columns::All => dispatch(Native { row: self, instant }),
+            Columns::Motion => self.start(instant),
+        }
+    }
+
+    /// Time, angles and speeds of an instant, and nothing more yet.
+    #[inline(always)]
+    fn start<const N: usize>(&mut self, instant: &Instant<T, N>) {
+        let row = &mut self.0;
+        row.clear();
+        row.push(instant.input.time);
+        for joints in [&instant.state.q, &instant.state.qd] {
+            row.extend(joints.iter());
+        }
     }
 
     /// An instant with forces of another engine.
@@ -117,12 +131,9 @@ impl<T: Scalar> Row<T> {
         let handle = input.handle.position;
         let in_room = |at: Plane<T>| [0, 1].map(|axis| at[axis] + input.base.position[axis]);
 
+        self.start(instant);
         let row = &mut self.0;
-        row.clear();
-        row.push(input.time);
-        for joints in [q, qd, &forces.qdd] {
-            row.extend(joints.iter());
-        }
+        row.extend(forces.qdd.iter());
         row.extend(in_room(model.tip(q, &pose)));
         if has_handle(model) {
             row.extend(in_room(handle));
@@ -177,8 +188,9 @@ fn has_handle<T, const N: usize>(model: &Model<T, N>) -> bool {
     !matches!(model.link, Link::Free)
 }
 
-/// The columns that grow with every instant, and how many numbers of it each takes.
-fn columns<const N: usize>(
+/// The columns that grow with every instant, and how many numbers of it each takes; the first three are those of
+/// [`Columns::Motion`].
+fn all_columns<const N: usize>(
     recording: &mut Recording<N>,
     handle: bool,
 ) -> [(&mut Vec<f64>, usize); 25] {
@@ -214,6 +226,19 @@ fn columns<const N: usize>(
     ]
 }
 
+/// [`all_columns`] that an experiment records.
+fn columns<'a, const N: usize>(
+    recording: &'a mut Recording<N>,
+    prepared: &Prepared<N>,
+) -> impl Iterator<Item = (&'a mut Vec<f64>, usize)> + use<'a, N> {
+    let recorded = match prepared.experiment.columns {
+        Columns::All => usize::MAX,
+        Columns::Motion => 3,
+    };
+    let all = all_columns(recording, has_handle(&prepared.model));
+    all.into_iter().take(recorded)
+}
+
 /// Takes a run apart, see [`simulate_in_pieces`](crate::simulate_in_pieces).
 pub(crate) struct Pieces<'a, const N: usize> {
     /// Samples in each but the last.
@@ -225,7 +250,6 @@ pub(crate) struct Pieces<'a, const N: usize> {
 pub(crate) struct Recorder<'a, 't, const N: usize> {
     prepared: &'a Prepared<'a, N>,
     recording: Recording<N>,
-    handle: bool,
     pieces: Option<Pieces<'t, N>>,
     /// Samples that were taken away.
     from: usize,
@@ -251,22 +275,20 @@ impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
             effects: model.effects.iter().map(|e| (e.kind, e.index)).collect(),
             ..Recording::default()
         };
-        let handle = has_handle(model);
-        let robot = if prepared.has_robot() { 2 } else { 0 };
-        let widths = columns(&mut recording, handle).map(|(_, width)| width);
-        let numbers = widths.iter().sum::<usize>() + 3 * robot;
+        let robot = if prepared.records_robot() { 2 } else { 0 };
+        let widths = columns(&mut recording, prepared).map(|(_, width)| width);
+        let numbers = widths.sum::<usize>() + 3 * robot;
         require_room((size_of::<f64>() * numbers * room) as u64)?;
         let r = &mut recording;
         for column in [&mut r.robot_q, &mut r.robot_qd, &mut r.robot_qdd] {
             reserve_room(column, robot * room)?;
         }
-        for (column, width) in columns(r, handle) {
+        for (column, width) in columns(r, prepared) {
             reserve_room(column, width * room)?;
         }
         Ok(Self {
             prepared,
             recording,
-            handle,
             pieces,
             from: 0,
             balance: 0.0,
@@ -276,7 +298,7 @@ impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
     /// Appends an instant, of which `of` reads the numbers of this run. Breaks where nobody wants more of it.
     pub fn push<T>(&mut self, row: &Row<T>, of: impl Fn(&T) -> f64) -> ControlFlow<()> {
         let mut rest = row.0.as_slice();
-        for (column, width) in columns(&mut self.recording, self.handle) {
+        for (column, width) in columns(&mut self.recording, self.prepared) {
             let (mine, others) = rest.split_at(width);
             column.extend(mine.iter().map(&of));
             rest = others;
@@ -293,7 +315,7 @@ impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
         let Some(Pieces { take, .. }) = &mut self.pieces else {
             return ControlFlow::Continue(());
         };
-        if self.from == 0 {
+        if self.from == 0 && !self.recording.energy.kinetic.is_empty() {
             self.balance = self.recording.balance(0);
         }
         let piece = Piece {
@@ -303,7 +325,7 @@ impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
         };
         let wanted = take(&piece);
         self.from += self.recording.len();
-        for (column, _) in columns(&mut self.recording, self.handle) {
+        for (column, _) in columns(&mut self.recording, self.prepared) {
             column.clear();
         }
         let r = &mut self.recording;
@@ -316,6 +338,9 @@ impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
     /// Makes the robot's columns as long as the others.
     fn add_robot(&mut self) {
         let r = &mut self.recording;
+        if !self.prepared.records_robot() {
+            return;
+        }
         for motion in self
             .prepared
             .robot_motion(self.from..self.from + r.time.len())

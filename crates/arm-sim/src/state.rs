@@ -138,6 +138,31 @@ pub(crate) struct Outcome<T, const N: usize> {
     pub joint_force: [T; N],
 }
 
+impl<T: Scalar, const N: usize> Outcome<T, N> {
+    /// Nothing moves and nothing acts.
+    pub fn none() -> Self {
+        Self {
+            qdd: Joints::repeat(T::ZERO),
+            force_on_arm: [T::ZERO; 2],
+            power: [T::ZERO; 4],
+            joint_force: [T::ZERO; N],
+        }
+    }
+}
+
+impl<const L: usize, const N: usize> Outcome<Lanes<L>, N> {
+    /// Puts what follows in one lane there, without forces.
+    #[inline(always)]
+    pub fn set_lane(&mut self, lane: usize, of: &Outcome<f64, N>) {
+        for j in 0..N {
+            self.qdd[j].0[lane] = of.qdd[j];
+        }
+        for (all, one) in self.power.iter_mut().zip(of.power) {
+            all.0[lane] = one;
+        }
+    }
+}
+
 /// Powers as in [`Outcome::power`].
 #[inline(always)]
 pub(crate) fn powers<T: Scalar, const N: usize>(

@@ -20,6 +20,14 @@ pub(crate) struct Inputs<'a, T, const N: usize> {
     pub end: &'a Input<T, N>,
 }
 
+impl<'a, T, const N: usize> Inputs<'a, T, N> {
+    /// What drives the arm at a stage of [`Stages`].
+    #[inline(always)]
+    pub fn at_stage(&self, stage: usize) -> &'a Input<T, N> {
+        [self.start, self.middle, self.middle, self.end][stage]
+    }
+}
+
 /// Friction that has no single answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jam {
@@ -121,55 +129,34 @@ pub(crate) fn remember<T: Scalar, const N: usize>(
     }
 }
 
-/// The classical method; `evaluate` says what follows from input, angles, speeds and the states of the effects.
+/// What a step of Rk4 asks for at its stages. A trait, as closures cannot be made to be inlined.
+pub(crate) trait Stages<T, const N: usize> {
+    /// What follows from angles and speeds at one of [`STAGES`], asked for in order.
+    fn evaluate(&mut self, stage: usize, q: &Joints<T, N>, qd: &Joints<T, N>) -> Outcome<T, N>;
+}
+
+/// How far into a step each stage looks, as a fraction of the step, and its weight in the sum of slopes, in sixths.
+const STAGES: [(f64, f64); 4] = [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)];
+
+/// One step of the classical method.
 #[inline(always)]
-pub(crate) fn rk4<T: Scalar, const N: usize>(
-    model: &Model<T, N>,
-    (h, inputs): (f64, Inputs<T, N>),
-    (state, memory): (&mut State<T, N>, &mut Memory<T>),
-    mut evaluate: impl FnMut(&Input<T, N>, &Joints<T, N>, &Joints<T, N>, &[States<T>]) -> Outcome<T, N>,
+pub(crate) fn fourth_order<T: Scalar, const N: usize>(
+    h: f64,
+    state: &mut State<T, N>,
+    stages: &mut impl Stages<T, N>,
 ) {
-    let stages = [
-        (inputs.start, 0.0, 1.0),
-        (inputs.middle, 0.5 * h, 2.0),
-        (inputs.middle, 0.5 * h, 2.0),
-        (inputs.end, h, 1.0),
-    ];
     let zero = Joints::<T, N>::repeat(T::ZERO);
     // Slopes of the stage before, and the weighted sums of all.
     let (mut speed, mut acceleration) = (zero, zero);
     let (mut speeds, mut accelerations, mut powers) = (zero, zero, [T::ZERO; 4]);
-    for (stage, (input, ahead, weight)) in stages.into_iter().enumerate() {
-        let (ahead, weight) = (T::of(ahead), T::of(weight));
+    for (stage, (into, weight)) in STAGES.into_iter().enumerate() {
+        let (ahead, weight) = (T::of(into * h), T::of(weight));
         let (mut q, mut qd) = (state.q, state.qd);
         if stage > 0 {
             add(&mut q, ahead, &speed);
             add(&mut qd, ahead, &acceleration);
         }
-        if model.has_memory {
-            let (starts, rates) = (memory.state.as_flattened(), memory.rate.as_flattened());
-            for (i, at) in memory.stage.as_flattened_mut().iter_mut().enumerate() {
-                let start = starts[i];
-                *at = if stage > 0 {
-                    start + ahead * rates[i]
-                } else {
-                    start
-                };
-            }
-        }
-        let now = evaluate(input, &q, &qd, &memory.stage);
-        if model.has_memory {
-            model.memory_rates(
-                &motion(input, &q, &qd, &now),
-                &memory.stage,
-                &mut memory.rate,
-            );
-            let rates = memory.rate.as_flattened();
-            for (i, sum) in memory.sum.as_flattened_mut().iter_mut().enumerate() {
-                let before = if stage > 0 { *sum } else { T::ZERO };
-                *sum = before + weight * rates[i];
-            }
-        }
+        let now = stages.evaluate(stage, &q, &qd);
         (speed, acceleration) = (qd, now.qdd);
         add(&mut speeds, weight, &speed);
         add(&mut accelerations, weight, &acceleration);
@@ -183,11 +170,74 @@ pub(crate) fn rk4<T: Scalar, const N: usize>(
     for (work, power) in state.work.iter_mut().zip(&powers) {
         *work += sixth * *power;
     }
+}
+
+/// One step of the classical method, of the states of effects too; `evaluate` says what follows from input, angles, speeds and
+/// these.
+#[inline(always)]
+pub(crate) fn rk4<T: Scalar, const N: usize>(
+    model: &Model<T, N>,
+    (h, inputs): (f64, Inputs<T, N>),
+    (state, memory): (&mut State<T, N>, &mut Memory<T>),
+    evaluate: impl FnMut(&Input<T, N>, &Joints<T, N>, &Joints<T, N>, &[States<T>]) -> Outcome<T, N>,
+) {
+    let mut stages = Remembering {
+        model,
+        h,
+        inputs,
+        memory,
+        evaluate,
+    };
+    fourth_order(h, state, &mut stages);
     if model.has_memory {
-        let sums = memory.sum.as_flattened();
+        let (sixth, sums) = (T::of(h / 6.0), memory.sum.as_flattened());
         for (m, sum) in memory.state.as_flattened_mut().iter_mut().zip(sums) {
             *m += sixth * *sum;
         }
+    }
+}
+
+/// Stages with the states of effects, whose slopes are summed on the way.
+struct Remembering<'a, T, F, const N: usize> {
+    model: &'a Model<T, N>,
+    h: f64,
+    inputs: Inputs<'a, T, N>,
+    memory: &'a mut Memory<T>,
+    evaluate: F,
+}
+
+impl<T: Scalar, F, const N: usize> Stages<T, N> for Remembering<'_, T, F, N>
+where
+    F: FnMut(&Input<T, N>, &Joints<T, N>, &Joints<T, N>, &[States<T>]) -> Outcome<T, N>,
+{
+    #[inline(always)]
+    fn evaluate(&mut self, stage: usize, q: &Joints<T, N>, qd: &Joints<T, N>) -> Outcome<T, N> {
+        let input = self.inputs.at_stage(stage);
+        let (into, weight) = STAGES[stage];
+        let memory = &mut *self.memory;
+        if self.model.has_memory {
+            let ahead = T::of(into * self.h);
+            let (starts, rates) = (memory.state.as_flattened(), memory.rate.as_flattened());
+            for (i, at) in memory.stage.as_flattened_mut().iter_mut().enumerate() {
+                let start = starts[i];
+                *at = if stage > 0 {
+                    start + ahead * rates[i]
+                } else {
+                    start
+                };
+            }
+        }
+        let now = (self.evaluate)(input, q, qd, &memory.stage);
+        if self.model.has_memory {
+            self.model
+                .memory_rates(&motion(input, q, qd, &now), &memory.stage, &mut memory.rate);
+            let (weight, rates) = (T::of(weight), memory.rate.as_flattened());
+            for (i, sum) in memory.sum.as_flattened_mut().iter_mut().enumerate() {
+                let before = if stage > 0 { *sum } else { T::ZERO };
+                *sum = before + weight * rates[i];
+            }
+        }
+        now
     }
 }
 

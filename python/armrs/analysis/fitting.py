@@ -15,8 +15,9 @@ from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
 from ..tabular import Framed, Tidy
+from ..workflows.driven import CoreRun, driven
 from ..workflows.movement import Movement
-from ..workflows.simulate import DEFAULT_RATE, CoreRun, driven
+from ..workflows.simulate import DEFAULT_RATE
 from ..workflows.stiction import DEFAULT_DT
 
 

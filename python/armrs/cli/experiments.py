@@ -43,6 +43,10 @@ class Coupling(str, enum.Enum):
 Step = Annotated[
     float | None, typer.Option(help="Step [s], above 0; when absent 0.00025, or as much shorter as steep dry friction asks for.")
 ]
+Accuracy = Annotated[
+    float | None,
+    typer.Option(help="Largest error of an angle [rad], instead of a step: a step that keeps it is found by comparing runs."),
+]
 DrivingTrial = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
@@ -59,6 +63,7 @@ def simulate(
     out: MaybeFolder = None,
     engine: Annotated[Engine, typer.Option(help="Minimal coordinates, or rigid bodies and joints.")] = Engine.native,
     dt: Step = None,
+    accuracy_rad: Accuracy = None,
     rate_hz: Annotated[
         float, typer.Option(help="Samples a second that are recorded [Hz], above 0; a whole number of steps from one to the next.")
     ] = 50.0,
@@ -107,7 +112,7 @@ def simulate(
     }
     with contextlib.ExitStack() as stack:
         with console.progress("simulating"):
-            result = stack.enter_context(stream(arm, drive, folder, dt=dt, **options))
+            result = stack.enter_context(stream(arm, drive, folder, dt=dt, accuracy=accuracy_rad, **options))
         halved = None
         if check_step or is_doubtful(result) is not None:
             with (

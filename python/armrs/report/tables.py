@@ -180,9 +180,12 @@ def run(data: Mapping[str, Any]) -> Table:
     # An arm that rests at both ends, and a handle without a spring, store nothing: what is below the error is rounding.
     stored = energy["stored_J"] if abs(energy["stored_J"]) > energy["error_J"] else 0.0
     made_with = " ".join(filter(None, (data["engine"], data["integrator"])))
+    step = f"step {1e3 * data['dt_s']:.4g} ms"
+    if "angle_error_rad" in data:
+        step += f" (angles right to about {data['angle_error_rad']:.2g} rad)"
     rows = [
         ["duration", f"{data['duration_s']:.6g} s, {data['samples']} samples"],
-        ["engine", f"{made_with}, step {1e3 * data['dt_s']:.4g} ms, {data['coupling']} coupling"],
+        ["engine", f"{made_with}, {step}, {data['coupling']} coupling"],
         ["largest force on the arm", f"{data['largest_force_N']:.4g} N at {data['largest_force_at_s']:.4g} s"],
         ["largest joint speed", f"{data['largest_speed_rad_s']:.4g} rad/s"],
         ["stored energy", f"changed by {stored:.4g} J"],

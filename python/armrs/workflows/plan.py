@@ -20,10 +20,10 @@ from ..io import files, tomlfile
 from ..model import Model, Tolerance
 from ..report.plain import origin
 from ..tabular import Tabular, Tidy
+from .driven import about
 from .experiment import Safety
 from .identify import CoreSettings, effects_of
 from .movement import Movement
-from .simulate import about
 
 
 @dataclass(frozen=True)

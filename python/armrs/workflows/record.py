@@ -21,10 +21,11 @@ from ..io.opensim import write_trc
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
+from .driven import CoreRun, driven
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .interaction import CONTROL_RATE, Interacted
 from .movement import Movement
-from .simulate import Channel, CoreRun, Sensors, Simulated, driven, simulate
+from .simulate import Channel, Sensors, Simulated, simulate
 from .stiction import DEFAULT_DT
 
 if TYPE_CHECKING:

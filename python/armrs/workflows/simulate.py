@@ -21,6 +21,7 @@ from ..model import Model, load_model
 from ..tabular import Labelled, Series, Tabular, Tidy
 from ..telling import telling
 from .accuracy import EnergyBalance, energy_balance
+from .driven import CoreDrive, CoreRun, about, driven
 from .movement import Movement
 from .stiction import DEFAULT_DT, smoothings, steps_to_try, sticking
 
@@ -284,6 +285,7 @@ def simulate(
     engine: str = "native",
     integrator: str | None = None,
     dt: float | None = None,
+    accuracy: float | None = None,
     rate: float | None = None,
     duration: float | None = None,
     coupling: str = "compliant",
@@ -307,6 +309,9 @@ def simulate(
         Step [s]. When absent 0.25 ms, or a 4th, 16th or 64th of it where smooth dry friction is too steep for it: the longest with which
         less than 1e-5 of the exchanged energy is unaccounted for. At any step, constant friction with the default smoothing that is too
         steep for 0.25 ms is set-valued: `smoothing` is 0 there in `model` of the run.
+    accuracy : float, optional
+        Largest error of a recorded angle against ever shorter steps [rad], instead of `dt`: of the fourth-order method, by comparing runs.
+        The step is 1/rate divided by a whole number, 1e-6 s or more; `settings` of the run tell it and the estimated error.
     rate : float, optional
         Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps. Sensors read this recording at a rate of their own,
         `sensors.rate`, which may not be larger: what is in between is not recorded. When absent, 50 Hz, or that of faster sensors.
@@ -330,23 +335,15 @@ def simulate(
     if rate is None:
         rate = DEFAULT_RATE if sensors is None else max(DEFAULT_RATE, sensors.rate)
     model = sticking(checks.loaded("model", model, Model, load_model))
+    _check_accuracy(accuracy, dt, engine, integrator)
 
     def run(step: float) -> Simulated:
-        asked = _asked(
-            model,
-            drive,
-            engine=engine,
-            integrator=integrator,
-            dt=step,
-            rate=rate,
-            duration=duration,
-            coupling=coupling,
-            start=(start, start_speed),
-        )
-        sensing = _seeded(sensors, seeds, rate)
-        with asked.about_drive():
-            return asked.recorded(_armrs.simulate(_armrs.Rig(asked.model), asked.led, asked.core, sensing))
+        options: dict[str, Any] = {"engine": engine, "integrator": integrator, "rate": rate, "duration": duration, "coupling": coupling}
+        asked = _asked(model, drive, dt=step, start=(start, start_speed), **options)
+        return _run(asked, accuracy, _seeded(sensors, seeds, rate))
 
+    if accuracy is not None:
+        return run(1.0 / checks.number("rate", rate, above=0.0, unit="Hz"))
     *shorter, last = steps_to_try(model, engine=engine, integrator=integrator, dt=dt)
     for step in shorter:
         with contextlib.suppress(SimulationError):  # a step that is too long may end the run
@@ -354,6 +351,17 @@ def simulate(
             if is_doubtful(made) is None:
                 return made
     return run(last)
+
+
+def _run(asked: _Asked, accuracy: float | None, sensing: tuple[Sensors, list[int]] | None) -> Simulated:
+    """Return a run with the step that is asked for, or with one that keeps an accuracy."""
+    rig = _armrs.Rig(asked.model)
+    with asked.about_drive():
+        if accuracy is None:
+            return asked.recorded(_armrs.simulate(rig, asked.led, asked.core, sensing))
+        raw, dt, error = _armrs.simulate_accurately(rig, asked.led, asked.core, accuracy, sensing)
+    made = asked.recorded(raw)
+    return dataclasses.replace(made, settings=made.settings | _resolved(dt, accuracy, error))
 
 
 def simulate_in_pieces(
@@ -381,6 +389,50 @@ def simulate_in_pieces(
     )
     with asked.about_drive():
         _armrs.simulate_in_pieces(_armrs.Rig(model), asked.led, asked.core, samples, lambda raw: take(asked.recorded(raw)))
+
+
+def resolve(
+    model: Model,
+    drive: Movement | Trial | None,
+    accuracy: float,
+    *,
+    engine: str = "native",
+    integrator: str | None = None,
+    dt: float | None = None,
+    rate: float = DEFAULT_RATE,
+    **options: Any,
+) -> dict[str, float]:
+    """Return the settings of `simulate` with an accuracy [rad]: step, accuracy and estimated error; of the runs nothing is kept.
+
+    Raises
+    ------
+    BadInput, SimulationError
+        As `simulate`.
+    """
+    _check_accuracy(accuracy, dt, engine, integrator)
+    step = 1.0 / checks.number("rate", rate, above=0.0, unit="Hz")
+    asked = _asked(model, drive, engine=engine, integrator=integrator, dt=step, rate=rate, start=(None, None), **options)
+    with asked.about_drive():
+        chosen, error = _armrs.resolve(_armrs.Rig(model), asked.led, asked.core, accuracy)
+    return _resolved(chosen, accuracy, error)
+
+
+def _resolved(dt: float, accuracy: float, error: float) -> dict[str, float]:
+    """Return the settings of a run whose step was found for an accuracy."""
+    return {"dt_s": dt, "accuracy_rad": accuracy, "angle_error_rad": error}
+
+
+def _check_accuracy(accuracy: float | None, dt: float | None, engine: str, integrator: str | None) -> None:
+    """Refuse an accuracy beside a step, or of what has none."""
+    if accuracy is None:
+        return
+    checks.number("accuracy", accuracy, above=0.0, unit="rad")
+    if dt is not None:
+        raise BadInput("dt, accuracy", Text("both"), "one of them: the step is found for the accuracy")
+    if engine == "rapier":
+        raise BadInput("accuracy", accuracy, "none beside the engine rapier, whose error has no known order")
+    if integrator == "euler":
+        raise BadInput("accuracy", accuracy, "none beside the integrator euler; the step is found for rk4")
 
 
 @dataclass(frozen=True, eq=False)
@@ -477,16 +529,6 @@ def _clock(dt: float, rate: float) -> Text:
     return Text(f"a step of {dt:g} s and {rate:g} Hz")
 
 
-def about(drive: Movement | Trial | None, error: BadInput, more: str = "") -> BadInput:
-    """Return a refusal of the core with the file of the drive, where it is about how that leads the arm; `more` is said of its length."""
-    if drive is None:
-        return error
-    if error.place == "duration":
-        place = f"length of the {type(drive).__name__.lower()} [s]"
-        return BadInput(place, error.found, f"{error.allowed}{more}", file=drive.file, hint=error.hint)
-    return error.within(file=drive.file) if error.place.startswith("handle at ") else error
-
-
 def _check_duration(duration: float, dt: float, rate: float) -> None:
     """Refuse a length of a run that is no whole number of steps, or holds no sample interval."""
     checks.number("duration", duration, above=0.0, unit="s")
@@ -495,60 +537,6 @@ def _check_duration(duration: float, dt: float, rate: float) -> None:
     steps = duration / dt
     if abs(steps - round(steps)) > 1e-9 * steps:
         raise BadInput("duration", duration, f"a whole number of steps of {dt:g} s", hint=f"nearest: {round(steps) * dt:.9g} s")
-
-
-@dataclass(frozen=True, eq=False)
-class CoreDrive:
-    """How an arm is driven: "movement", "robot", "torque" or "free"; values are its waypoints, or samples at the times."""
-
-    kind: str
-    rigid: bool
-    values: np.ndarray | None = None
-    times: np.ndarray | None = None
-    shape: str = "trapezoid"
-    speed: float = 0.0
-    acceleration: float = 0.0
-    pause: float = 0.0
-    base: np.ndarray | None = None
-    """How far the first joint is from the model's base at the times [m]."""
-
-
-@dataclass(frozen=True)
-class CoreRun:
-    """How a run is computed: where it starts, its length [s] where the drive does not say it, and time from sample to sample [s]."""
-
-    integrator: str
-    dt: float
-    output_interval: float
-    engine: str = "native"
-    duration: float | None = None
-    q: list[float] | None = None
-    qd: list[float] | None = None
-
-
-def driven(model: Model, drive: Movement | Trial | None, coupling: str) -> CoreDrive:
-    """Return a drive as the core takes it."""
-    rigid = coupling == "rigid"
-    if isinstance(drive, Movement):
-        return CoreDrive("movement", rigid, drive.waypoints, None, drive.shape, drive.speed, drive.acceleration, drive.pause)
-    if drive is not None:
-        kind, values = ("robot", drive.robot_q) if drive.robot_q is not None else ("torque", drive.tau)
-        if values is None:
-            raise BadInput("columns", "neither robot angles nor joint torques", "qr1_rad and qr2_rad, or tau1_Nm …", file=drive.file)
-        there = np.isfinite(values).all(axis=1)
-        if drive.base is not None:
-            there &= np.isfinite(drive.base).all(axis=1)
-        upto = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
-        if not there[:upto].all() or not upto:
-            lost = float(drive.t[int(np.argmin(there))])
-            what = "robot angles" if kind == "robot" else "joint torques"
-            if drive.base is not None:
-                what = f"{what} or path of the first joint"
-            raise BadInput(what, Text(f"none at {lost:g} s"), "samples without a gap: they drive the arm", file=drive.file)
-        times = np.array(drive.t[:upto] - drive.t[0])
-        base = None if drive.base is None else _armrs.displacement_of_base(drive.base[:upto], model.base, drive.rate)
-        return CoreDrive(kind, rigid, np.array(values[:upto]), times, base=base)
-    return CoreDrive("free", rigid)
 
 
 def _seeded(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> tuple[Sensors, list[int]] | None:

@@ -16,7 +16,7 @@ from ..io import files
 from ..io.trial import Trial
 from ..model import Model
 from .movement import Movement
-from .simulate import PIECE, Doubted, Simulated, digested, is_doubtful, simulate_in_pieces
+from .simulate import PIECE, Doubted, Simulated, digested, is_doubtful, resolve, simulate_in_pieces
 from .stiction import steps_to_try, sticking
 
 
@@ -105,18 +105,26 @@ def _arrays(piece: Simulated) -> dict[str, np.ndarray]:
 
 
 @contextlib.contextmanager
-def stream(model: Model, drive: Movement | Trial | None, near: Path | None = None, **options: Any) -> Iterator[Streamed]:
+def stream(
+    model: Model, drive: Movement | Trial | None, near: Path | None = None, *, accuracy: float | None = None, **options: Any
+) -> Iterator[Streamed]:
     """Simulate a run of any length, as long as it is looked at.
 
     Parameters
     ----------
     model, drive, options
         As of `simulate`; nothing that sensors read.
+    accuracy : float, optional
+        As of `simulate`; the run is made once more with the step that is found.
     near : path, optional
         On whose disk samples may be kept for that time: this folder, or where it is to be.
     """
     model = sticking(model)
-    tried = steps_to_try(model, engine=options.get("engine", "native"), integrator=options.get("integrator"), dt=options.pop("dt", None))
+    dt, found = options.pop("dt", None), {}
+    if accuracy is not None:
+        found = resolve(model, drive, accuracy, dt=dt, **options)
+        dt = found["dt_s"]
+    tried = steps_to_try(model, engine=options.get("engine", "native"), integrator=options.get("integrator"), dt=dt)
     for step in tried:
         with contextlib.ExitStack() as stack:
             run = Streamed(model, near, stack)
@@ -126,6 +134,7 @@ def stream(model: Model, drive: Movement | Trial | None, near: Path | None = Non
                 if step == tried[-1]:
                     raise
                 continue  # a step that is too long may end the run
+            run.settings = run.settings | found
             if step == tried[-1] or is_doubtful(run) is None:
                 yield run
                 return

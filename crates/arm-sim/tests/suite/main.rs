@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod batch;
+mod chosen_step;
 mod common;
 mod controlled;
 mod energy;

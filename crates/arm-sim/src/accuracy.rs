@@ -1,0 +1,285 @@
+//! Runs of which the angles are right to a stated accuracy: the step is found by comparing runs.
+//!
+//! On a uniform grid the error of the fourth-order method is `C hᵖ` at every sample, so that two runs with steps h and r h differ
+//! by `(rᵖ − 1)` times the error of the finer one (Richardson 1911). The order p is 4 where all is smooth. Elsewhere (dry friction,
+//! play, effects that are not linear) it is taken from three runs, and as 1 before there are three. Every decision follows
+//! from bits of the runs, so that the step is the same everywhere.
+
+use std::ops::ControlFlow;
+
+use arm_core::Joints;
+
+use crate::model::Link;
+use crate::prepare::{assemble, link};
+use crate::stability::Vibration;
+use crate::{
+    Columns, Coupling, Drive, Engine, Experiment, Integrator, Recording, SimulationError, Start,
+    simulate_batch, simulate_in_pieces,
+};
+
+/// Order of the integrator.
+const ORDER: f64 = 4.0;
+/// The first step, as a fraction of the largest that is stable.
+const FIRST: f64 = 0.5;
+/// What a step that is foretold to be fine enough leaves of the accuracy.
+const AIM: f64 = 0.7;
+/// How much finer the next run is, at least and at most: nearer to the last, their difference says little.
+const FINER: (f64, f64) = (1.5, 8.0);
+/// Shortest step that is tried \[s\].
+const SHORTEST: f64 = 1e-6;
+/// Samples that a streamed run holds.
+const PIECE: usize = 16384;
+
+/// The step of a run, and how far its angles are from those of an ever finer one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolved {
+    /// Step \[s\]: the interval from sample to sample, divided by a whole number.
+    pub dt: f64,
+    /// Largest error of a recorded angle, as estimated from a coarser run \[rad\].
+    pub error: f64,
+}
+
+/// Simulates experiments with the native engine so that recorded angles are right to an accuracy \[rad\]; `dt` and the integrator of
+/// the experiments do not matter.
+///
+/// * `threads` - as of [`simulate_batch`]; no result depends on it
+///
+/// # Errors
+/// [`SimulationError::Accuracy`] where the accuracy is not reached; [`SimulationError::Setting`] for an accuracy that is not positive or
+/// experiments that are recorded at every step; else as [`simulate`](crate::simulate).
+///
+/// ```
+/// use arm_sim::{models, simulate_accurately};
+/// let mut experiment = models::human_experiment(2.0, [0.0; 3])?;
+/// experiment.output_interval = Some(0.02);
+/// let (recording, resolved) = simulate_accurately(&[experiment], 1e-6, 1).remove(0)?;
+/// assert!(resolved.error <= 1e-6 && resolved.dt > 1e-3);
+/// assert_eq!(recording.time.len(), 101);
+/// # Ok::<(), arm_sim::SimulationError>(())
+/// ```
+pub fn simulate_accurately<const N: usize>(
+    experiments: &[Experiment<N>],
+    accuracy: f64,
+    threads: usize,
+) -> Vec<Result<(Recording<N>, Resolved), SimulationError>> {
+    let mut searches: Vec<_> = experiments
+        .iter()
+        .map(|experiment| Search::new(experiment, accuracy))
+        .collect();
+    let mut done: Vec<Option<Result<_, _>>> = searches
+        .iter()
+        .map(|search| search.as_ref().err().cloned().map(Err))
+        .collect();
+    loop {
+        let mut pending: Vec<usize> = (0..done.len()).filter(|&i| done[i].is_none()).collect();
+        if pending.is_empty() {
+            return done.into_iter().flatten().collect();
+        }
+        // Equal steps side by side.
+        pending.sort_by_key(|&i| searches[i].as_ref().map_or(0, |search| search.steps));
+        let runs: Vec<Experiment<N>> = pending
+            .iter()
+            .filter_map(|&i| searches[i].as_ref().ok())
+            .map(|search| search.experiment.clone())
+            .collect();
+        for (i, run) in pending.into_iter().zip(simulate_batch(&runs, threads)) {
+            let Ok(search) = &mut searches[i] else {
+                continue;
+            };
+            let judged = search.judge(run.as_ref().map(|run| [&run.q[..], &run.qd[..]]));
+            done[i] = match (judged, run) {
+                (Ok(None), _) => None,
+                (Ok(Some(resolved)), Ok(recording)) => Some(Ok((recording, resolved))),
+                (Err(error), _) | (_, Err(error)) => Some(Err(error)),
+            };
+        }
+    }
+}
+
+/// The step of [`simulate_accurately`] for one experiment; of the runs nothing but their angles is kept.
+///
+/// # Errors
+/// As [`simulate_accurately`].
+pub fn resolve<const N: usize>(
+    experiment: &Experiment<N>,
+    accuracy: f64,
+) -> Result<Resolved, SimulationError> {
+    let mut search = Search::new(experiment, accuracy)?;
+    search.columns = Columns::Motion;
+    loop {
+        let (mut q, mut qd) = (Vec::new(), Vec::new());
+        let run = simulate_in_pieces(Engine::Native, &search.experiment, PIECE, &mut |piece| {
+            q.extend_from_slice(&piece.recording.q);
+            qd.extend_from_slice(&piece.recording.qd);
+            ControlFlow::Continue(())
+        });
+        if let Some(resolved) = search.judge(run.as_ref().map(|()| [&q[..], &qd[..]]))? {
+            return Ok(resolved);
+        }
+    }
+}
+
+/// A coarser run.
+struct Coarser {
+    /// Steps from sample to sample.
+    steps: usize,
+    angles: Vec<f64>,
+    /// How far it was from one that was coarser still \[rad\], and by how much its steps were shorter.
+    change: Option<(f64, f64)>,
+}
+
+/// The search for the step of one experiment.
+struct Search<const N: usize> {
+    /// With the step that is tried next. The first run only serves to compare the second with.
+    experiment: Experiment<N>,
+    /// What is recorded of later runs.
+    columns: Columns,
+    accuracy: f64,
+    /// From sample to sample \[s\].
+    interval: f64,
+    /// Steps in that.
+    steps: usize,
+    is_smooth: bool,
+    coarser: Option<Coarser>,
+}
+
+impl<const N: usize> Search<N> {
+    fn new(experiment: &Experiment<N>, accuracy: f64) -> Result<Self, SimulationError> {
+        let setting = |name, found, allowed| SimulationError::Setting {
+            name,
+            found,
+            allowed,
+        };
+        if !(accuracy > 0.0 && accuracy.is_finite()) {
+            return Err(setting(
+                "accuracy",
+                accuracy,
+                "a positive number of radians",
+            ));
+        }
+        let interval = experiment.output_interval.unwrap_or(f64::NAN);
+        if !(interval > 0.0 && interval.is_finite()) {
+            let allowed = "a positive number of seconds where the step is chosen";
+            return Err(setting("output interval", interval, allowed));
+        }
+        let setup = experiment.altered()?;
+        let link = link(experiment, &setup)?;
+        let model = assemble(&setup, &experiment.effects, link)?;
+        let (Start::Given { q, .. } | Start::Equilibrium { near: q }) = &experiment.start;
+        let largest = match &model.link {
+            Link::Compliant(contact) => {
+                Vibration::at(contact, &model, q).largest_step(Integrator::Rk4)
+            }
+            _ => f64::INFINITY,
+        };
+        let mut search = Self {
+            experiment: experiment.clone(),
+            columns: experiment.columns,
+            accuracy,
+            interval,
+            steps: 0,
+            is_smooth: model.is_smooth(),
+            coarser: None,
+        };
+        search.experiment.integrator = Integrator::Rk4;
+        search.experiment.columns = Columns::Motion;
+        search.refine(interval / (FIRST * largest))?;
+        Ok(search)
+    }
+
+    /// Starts at the equilibrium that a run has found; a rigid coupling projects its start, and is left to look for it again.
+    fn start_as_before(&mut self, columns: [&[f64]; 2]) {
+        let is_compliant = !matches!(
+            self.experiment.drive,
+            Drive::Handle {
+                coupling: Coupling::Rigid,
+                ..
+            }
+        );
+        if is_compliant && matches!(self.experiment.start, Start::Equilibrium { .. }) {
+            let [q, qd] = columns.map(|all| Joints::from_fn(|j, _| all[j]));
+            self.experiment.start = Start::Given { q, qd };
+        }
+    }
+
+    /// Judges a run by its angles and speeds: `None` where another one is asked for.
+    fn judge(
+        &mut self,
+        run: Result<[&[f64]; 2], &SimulationError>,
+    ) -> Result<Option<Resolved>, SimulationError> {
+        let [angles, speeds] = match run {
+            Ok(columns) => columns,
+            // A step that is too long may end the run.
+            Err(SimulationError::TooStiff { .. } | SimulationError::Diverged { .. }) => {
+                self.coarser = None;
+                self.experiment.columns = Columns::Motion;
+                return self.refine(2.0 * self.steps as f64).map(|()| None);
+            }
+            Err(error) => return Err(error.clone()),
+        };
+        let change = self.coarser.as_ref().map(|coarser| {
+            let distance = coarser
+                .angles
+                .iter()
+                .zip(angles)
+                .map(|(a, b)| (a - b).abs());
+            let finer = self.steps as f64 / coarser.steps as f64;
+            (distance.fold(0.0, f64::max), finer)
+        });
+        let error =
+            change.map(|(change, finer)| change / (libm::pow(finer, self.order(change)) - 1.0));
+        if let Some(error) = error.filter(|error| *error <= self.accuracy) {
+            let dt = self.experiment.dt;
+            return Ok(Some(Resolved { dt, error }));
+        }
+        self.experiment.columns = self.columns;
+        self.start_as_before([angles, speeds]);
+        self.coarser = Some(Coarser {
+            steps: self.steps,
+            angles: angles.to_vec(),
+            change,
+        });
+        let least = FINER.0 * self.steps as f64;
+        let foretold = error.map_or(least, |error| {
+            self.steps as f64 * libm::pow(error / (AIM * self.accuracy), 1.0 / ORDER)
+        });
+        let most = FINER.1 * self.steps as f64;
+        let error = error.unwrap_or(f64::INFINITY);
+        self.refine(foretold.max(least).min(most))
+            .map_err(|_| SimulationError::Accuracy {
+                asked: self.accuracy,
+                reached: error,
+                dt: self.experiment.dt,
+            })?;
+        Ok(None)
+    }
+
+    /// The order of convergence that the latest change of the angles shows.
+    fn order(&self, change: f64) -> f64 {
+        if self.is_smooth {
+            return ORDER;
+        }
+        let before = self.coarser.as_ref().and_then(|coarser| coarser.change);
+        before
+            .map_or(1.0, |(before, finer)| {
+                libm::log(before / change) / libm::log(finer)
+            })
+            .clamp(1.0, ORDER)
+    }
+
+    /// Takes at least so many steps from sample to sample.
+    fn refine(&mut self, steps: f64) -> Result<(), SimulationError> {
+        let steps = (steps - 1e-9).ceil().max(1.0);
+        let dt = self.interval / steps;
+        if dt < SHORTEST {
+            return Err(SimulationError::Accuracy {
+                asked: self.accuracy,
+                reached: f64::INFINITY,
+                dt: self.experiment.dt,
+            });
+        }
+        self.steps = steps as usize;
+        self.experiment.dt = dt;
+        Ok(())
+    }
+}
