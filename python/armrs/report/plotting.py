@@ -116,8 +116,17 @@ def halo() -> list[Any]:
 
 def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
     """Write a figure as the PNG image that stands in reports."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     with style():
-        figure.savefig(target, format="png", dpi=130)
+        figure.set_dpi(130)
+        canvas = FigureCanvasAgg(figure)
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)
+            figure.set_layout_engine("none")
+        # `savefig` would lay the figure out twice, and draw it once more to no end.
+        canvas.print_png(target)
 
 
 def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:
