@@ -126,7 +126,7 @@ def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
             engine.execute(figure)
             figure.set_layout_engine("none")
         # `savefig` would lay the figure out twice, and draw it once more to no end.
-        canvas.print_png(target)
+        canvas.print_png(target)  # type: ignore[no-untyped-call]
 
 
 def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:
