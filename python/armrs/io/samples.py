@@ -139,22 +139,22 @@ def _read_csv(path: Path) -> Samples:
             return Samples(names, [np.empty(0) for _ in names], csv_place(path))
         explain_csv(path, names)
         raise BadInput("file", Text(str(error).splitlines()[0]), "CSV with one number a cell") from None
-    samples = Samples(names, [_numbers(table.column(name)) for name in names], csv_place(path))
-    if any(_has_nan_text(table.column(name)) for name in names):
+    columns = [table.column(name) for name in names]
+    values = [_numbers(column) for column in columns]
+    # A NaN that was written out, rather than left empty.
+    if any(int(np.isnan(v).sum()) > c.null_count for v, c in zip(values, columns, strict=True)):
         explain_csv(path, names)
-    return samples
+    return Samples(names, values, csv_place(path))
 
 
 def _numbers(column: Any) -> np.ndarray:
-    """Return an Arrow column as float64 with NaN where it is null.
+    """Return an Arrow column of float64 with NaN where it is null.
 
     Numbers are taken from the buffers: Arrow's own conversion loads pandas where that is installed, which takes longer than a short verb.
     """
-    if str(column.type) != "double":
-        return np.ascontiguousarray(column.to_numpy(), dtype=np.float64)
     found = np.empty(len(column))
     done = 0
-    for chunk in column.chunks:
+    for chunk in filter(len, column.chunks):
         valid, data = chunk.buffers()
         of, to = slice(chunk.offset, chunk.offset + len(chunk)), slice(done, done + len(chunk))
         found[to] = np.frombuffer(data, dtype=np.float64)[of]
@@ -162,12 +162,6 @@ def _numbers(column: Any) -> np.ndarray:
             found[to][np.unpackbits(np.frombuffer(valid, dtype=np.uint8), bitorder="little")[of] == 0] = np.nan
         done += len(chunk)
     return found
-
-
-def _has_nan_text(column: Any) -> bool:
-    """Tell whether a NaN was written out, rather than left empty."""
-    values = _numbers(column)
-    return int(np.isnan(values).sum()) > column.null_count
 
 
 def explain_csv(path: Path, names: list[str], *, numbers: bool = True) -> None:
