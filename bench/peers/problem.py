@@ -13,7 +13,7 @@ import numpy as np
 LENGTH = np.array([0.322, 0.264, 0.093])
 COM = np.array([0.186, 0.121, 0.081])
 MASS = np.array([2.114, 1.264, 0.753])
-INERTIA = np.array([0.005, 0.001, 0.006])
+INERTIA = np.array([0.0157, 0.0061, 0.0016])
 GRAVITY = 9.81
 VISCOSITY, STIFFNESS = 0.2, 0.5
 SPRING = 1e4
