@@ -1,6 +1,6 @@
 """armrs beside other tools and a hand-written limit: one run, every tool in turn, ratios of medians.
 
-    compare.py [-o DIR] [--rounds N] [--rust PROGRAM]
+    compare.py [-o DIR] [--rounds N] [--count] [--rust PROGRAM]
 
 Needs what `requirements.txt` lists, a C++ compiler, and `PYTHONPATH` at the checkout's `python`; `make bench` arranges that. What is
 missing is skipped, with the reason in the report.
@@ -17,9 +17,12 @@ import sys
 import time
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
+import accuracy
 import checks
 import imports
+import instructions
 import problem
 import report
 from programs import Peer, start
@@ -49,15 +52,15 @@ def versions(peers: dict[str, Peer]) -> dict[str, str]:
     return found
 
 
-def measure(peers: dict[str, Peer], rounds: int) -> dict[str, list[float]]:
+def measure(peers: dict[str, Peer], rounds: int, chosen: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
     """Return the times of every measurement, all measured once in each round."""
     times: dict[str, list[float]] = {}
     for number in range(rounds):
         print(f"round {number + 1} of {rounds}", file=sys.stderr, flush=True)
         for item in MEASURED:
             # What takes seconds is measured three times.
-            if item.tool in peers and (not item.slow or number < 3):
-                answer = peers[item.tool].ask(item.task)
+            if item.tool in peers and (not item.slow or number < 3) and (not item.ladder or item.key in chosen):
+                answer = peers[item.tool].ask(f"{item.task}:{chosen[item.key]['rung']}" if item.ladder else item.task)
                 if answer is not None:
                     times.setdefault(item.key, []).append(answer["seconds"] / item.units)
         for key, seconds in imports.measure().items():
@@ -70,6 +73,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("-o", "--output", type=Path, default=Path("out/bench"))
     parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--count", action="store_true", help="count instructions too, with valgrind: some minutes")
     parser.add_argument("--rust", type=Path, default=Path("target/release/examples/peer"))
     arguments = parser.parse_args()
     folder = arguments.output
@@ -78,11 +82,22 @@ def main() -> int:
     peers, missing = start(work, arguments.rust)
     try:
         checked = checks.run(peers)
-        times = measure(peers, arguments.rounds)
+        right, agreement = accuracy.references(peers)
+        checked += agreement
+        chosen = accuracy.choose(peers, MEASURED, right)
+        times = measure(peers, arguments.rounds, chosen)
+        counts, uncounted = instructions.measure(peers, [i for i in MEASURED if i.key in times], chosen) if arguments.count else ({}, {})
     finally:
         for peer in peers.values():
             peer.stop()
-    result = {"versions": versions(peers), "missing": missing, "checks": checked, "seconds": times}
+    result = {
+        "versions": versions(peers),
+        "missing": missing | uncounted,
+        "checks": checked,
+        "accuracy": chosen,
+        "seconds": times,
+        "instructions": counts,
+    }
     result["goals"] = [goal.judge(report.medians(times)) for goal in GOALS]
     (folder / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     words = report.words(result)

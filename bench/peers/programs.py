@@ -22,6 +22,7 @@ class Peer:
     """A program that answers a line with a line of JSON."""
 
     def __init__(self, command: list[str]) -> None:
+        self.command = command
         self._program = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         # Its first answer, to a question that nobody knows, says that it runs.
         self.ask("ready")

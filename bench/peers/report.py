@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import problem
-from workloads import GROUPS, JOINTS, MEASURED
+from workloads import GROUPS, JOINTS, MEASURED, Measured
 
 TITLES = {
     "W1": "W1: kernels of the arm with three joints, a call",
     "W2": "W2: one run of 20 s, a step",
+    "W2a": "W2a: one run of 20 s, every angle right to 1e-6 rad, the whole run",
     "W3": "W3: 1000 runs of 2 s, a step of one run",
+    "W3a": "W3a: 1000 runs of 2 s, every angle right to 1e-6 rad, all runs",
     "W4": "W4: the cascade, the whole of it",
     "W6": "W6: six parameters of the joints fitted to 20 s by simulation",
 }
@@ -42,13 +44,7 @@ def words(result: dict[str, Any]) -> str:
         lines.append(f"| {goal['line']} | {goal['what']} | {found} | {'≤' if goal['at_most'] else '≥'} {goal['limit']:g} | {mark} |")
     lines += _imports(middle)
     for workload, title in TITLES.items():
-        lines += ["", f"## {title}", "", "| what | tool | time |", "| --- | --- | --- |"]
-        for item in MEASURED:
-            if item.workload == workload and item.key in middle:
-                kernel = item.task.split(":")[0].replace("_", " ") if workload == "W1" else ""
-                size = f"{int(item.task.split(':')[-1]):,} samples".replace(",", " ") if workload == "W4" else ""
-                what = ", ".join(part for part in (kernel, size, item.name) if part)
-                lines.append(f"| {what} | {item.tool} | {time_of(middle[item.key])} |")
+        lines += ["", f"## {title}", "", *_table(workload, result, middle)]
     lines += [
         "",
         "## Do all solve the same problem?",
@@ -65,6 +61,48 @@ def words(result: dict[str, Any]) -> str:
     if result["missing"]:
         lines += ["", "## Skipped", "", *(f"- {tool}: {reason}" for tool, reason in result["missing"].items())]
     return "\n".join(lines) + "\n"
+
+
+def _table(workload: str, result: dict[str, Any], middle: dict[str, float]) -> list[str]:
+    """Return the lines of a workload's table; where a step or tolerance was chosen, with it and the errors."""
+    items = [item for item in MEASURED if item.workload == workload and item.key in middle]
+    counts, chosen = result.get("instructions", {}), result["accuracy"]
+    head = ["what", "tool"]
+    if workload in ("W2a", "W3a"):
+        head += ["step or tolerance", "error [rad]", "error at the one before"]
+    head.append("time")
+    if any(item.key in counts for item in items):
+        head.append("instructions")
+    lines = [f"| {' | '.join(head)} |", "| --- " * len(head) + "|"]
+    for item in items:
+        cells = {"what": _what(item), "tool": item.tool, "time": time_of(middle[item.key])}
+        if item.ladder:
+            cells |= _chosen(chosen[item.key])
+        if item.key in counts:
+            cells["instructions"] = f"{counts[item.key]:.4g}" if counts[item.key] < 1e5 else f"{counts[item.key] / 1e6:.4g} million"
+        lines.append(f"| {' | '.join(cells.get(name, '') for name in head)} |")
+    return lines
+
+
+def _what(item: Measured) -> str:
+    kernel = item.task.split(":")[0].replace("_", " ") if item.workload == "W1" else ""
+    size = ""
+    if item.workload == "W4":
+        samples = int(item.task.split(":")[-1])
+        # Three angles and two components of a force.
+        size = f"{samples:,} samples ({40 * samples / 1e6:g} MB)".replace(",", " ")
+    return ", ".join(part for part in (kernel, size, item.name) if part)
+
+
+def _chosen(rung: dict[str, Any]) -> dict[str, str]:
+    """Return the cells of what was chosen: steps from one sample at 50 Hz to the next are whole numbers, tolerances are not."""
+    text, before = rung["rung"], rung["error_before"]
+    step = f"{1e3 * problem.RECORD * problem.STEP / int(text):.3g} ms" if text.isdigit() else text
+    return {
+        "step or tolerance": step,
+        "error [rad]": f"{rung['error']:.2g}",
+        "error at the one before": "" if before is None else f"{before:.2g}",
+    }
 
 
 def _imports(middle: dict[str, float]) -> list[str]:

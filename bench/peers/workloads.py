@@ -21,6 +21,8 @@ class Measured:
     name: str = ""
     units: float = 1.0
     slow: bool = False
+    ladder: tuple[str, ...] = ()
+    """Steps from one sample to the next, or tolerances, of which the first that is right is measured; the task ends with it."""
 
     @property
     def key(self) -> str:
@@ -78,6 +80,49 @@ def _batches() -> list[Measured]:
     return _each("W3", BATCH_STEPS, rows, slow=True)
 
 
+def _ladder(*substeps: int) -> tuple[str, ...]:
+    return tuple(str(n) for n in substeps)
+
+
+EULER = ("80",)
+"""Semi-implicit Euler as in W2 and W3, at 0.25 ms, whatever its error."""
+COARSE = _ladder(*range(2, 17), *range(18, 41, 2))
+"""From 10 ms to 0.5 ms, for methods of second and fourth order."""
+FINE = _ladder(*range(40, 161, 4))
+"""From 0.5 ms to 0.125 ms, for methods of first order."""
+TOLERANCES = tuple(f"{digit}e-{power}" for power in range(4, 11) for digit in (5, 2, 1))
+"""Relative, and absolute [rad, rad/s]."""
+
+
+def _accurate() -> list[Measured]:
+    # For armrs a task without a ladder takes its place as soon as a run has an accuracy instead of a step.
+    rows = [
+        ("limit", "accurate:euler", "semi-implicit Euler at 0.25 ms", EULER),
+        ("limit", "accurate:rk4", "fourth order", COARSE),
+        ("limit", "accurate:rk4_table", "fourth order, the path from a table", COARSE),
+        ("armrs, Rust", "accurate", "fourth order", COARSE),
+        ("armrs, Python", "accurate", "armrs.simulate, fourth order", COARSE),
+        ("numba", "accurate:rk4", "fourth order", COARSE),
+        ("numba", "accurate:dop853", "SciPy's DOP853", TOLERANCES),
+        ("numba", "accurate:lsoda", "SciPy's LSODA (odeint)", TOLERANCES),
+        ("Pinocchio, C++", "accurate:rk4", "fourth order, path from a table", COARSE),
+        ("MuJoCo, C", "accurate:rk4", "RK4, path from a table in every stage", COARSE),
+        ("MuJoCo, C", "accurate:implicitfast", "implicitfast, path from a table", FINE),
+        ("MuJoCo, Python", "accurate:rk4", "rollout, RK4, path held over a step", COARSE),
+        ("MuJoCo, Python", "accurate:implicitfast", "rollout, implicitfast, path held over a step", FINE),
+    ]
+    batch = [
+        ("limit", "batch:accurate:euler", "semi-implicit Euler at 0.25 ms, four runs in a register", EULER),
+        ("limit", "batch:accurate:rk4_scalar", "fourth order, one run after another", COARSE),
+        ("limit", "batch:accurate:rk4_avx2", "fourth order, four runs in a register", COARSE),
+        ("limit", "batch:accurate:rk4_avx512", "fourth order, eight runs in a register or two", COARSE),
+        ("armrs, Rust", "batch:accurate", "simulate_batch, fourth order, one thread", COARSE),
+        ("MuJoCo, Python", "batch:accurate:rk4", "rollout of 20 of the runs, RK4, path held over a step", COARSE),
+    ]
+    single = [Measured("W2a", tool, task, name, ladder=ladder) for tool, task, name, ladder in rows]
+    return single + [Measured("W3a", tool, task, name, slow=True, ladder=ladder) for tool, task, name, ladder in batch]
+
+
 def _cascades() -> list[Measured]:
     found = []
     for size in problem.SIZES:
@@ -106,6 +151,7 @@ MEASURED = [
     *_kernels(),
     *_runs(),
     *_batches(),
+    *_accurate(),
     *_cascades(),
     *_sizes(),
     Measured("W6", "armrs, Python", "fit", "armrs.fit_by_simulation"),
@@ -150,13 +196,15 @@ GOALS = [
     _most(1, "single run: armrs / limit with the path from a table", "run/armrs, Rust", "run:table/limit", 1.5),
     _least(1, "single run: MuJoCo from C / armrs", "run/MuJoCo, C", "run/armrs, Rust", 12),
     _least(1, "single run: Pinocchio from C++ / armrs", "run/Pinocchio, C++", "run/armrs, Rust", 12),
-    _most(1, "single run from Python, 50 Hz: armrs / numba", "run/armrs, Python", "run/numba", 1),
+    _most(1, "single run from Python, 50 Hz: armrs / numba", "run/armrs, Python", "run/numba", 0.8),
     _least(1, "single run from Python: MuJoCo's rollout / armrs", "run/MuJoCo, Python", "run/armrs, Python", 10),
     _most(2, "batch: armrs / limit with AVX2", "batch/armrs, Rust", "batch:avx2/limit", 1.5),
     _least(2, "batch: MuJoCo's rollout / armrs", "batch/MuJoCo, Python", "batch/armrs, Rust", 80),
     _least(2, "batch: one thread / two threads, wall clock", "batch:wall:1/armrs, Rust", "batch:wall:2/armrs, Rust", 1.7),
+    _most(2, "single run right to 1e-6 rad: armrs / limit by Euler at 0.25 ms", "accurate/armrs, Rust", "accurate:euler/limit", 0.3),
+    _most(2, "batch right to 1e-6 rad: armrs / limit by Euler at 0.25 ms", "batch:accurate/armrs, Rust", "batch:accurate:euler/limit", 0.3),
     _most(3, "inverse dynamics: armrs / limit", "inverse_dynamics/armrs, Rust", "inverse_dynamics/limit", 2),
-    _most(3, "forward dynamics: armrs / limit", "forward_dynamics/armrs, Rust", "forward_dynamics/limit", 2),
+    _most(3, "forward dynamics: armrs / limit", "forward_dynamics/armrs, Rust", "forward_dynamics/limit", 1.5),
     _most(
         3,
         "inverse dynamics, a call from Python: armrs / Pinocchio",
@@ -185,7 +233,7 @@ GOALS = [
         "forward_dynamics:batch/armrs, Python",
         30,
     ),
-    _least(4, "cascade of a million samples: lsq_linear / armrs", f"cascade:lsq_linear:{MOST}/SciPy", f"cascade:{MOST}/armrs, Rust", 30),
+    _least(4, "cascade of a million samples: lsq_linear / armrs", f"cascade:lsq_linear:{MOST}/SciPy", f"cascade:{MOST}/armrs, Rust", 40),
     _least(
         4, "cascade of a million samples: least_squares / armrs", f"cascade:least_squares:{MOST}/SciPy", f"cascade:{MOST}/armrs, Rust", 100
     ),

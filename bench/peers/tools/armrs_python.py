@@ -40,9 +40,14 @@ speed = float(np.abs(problem.TO - problem.FROM).max() / (0.9 * half))
 movement = armrs.Movement(np.array([problem.FROM, problem.TO, problem.FROM]), speed=speed, acceleration=speed / (0.1 * half))
 
 
-def run(of: armrs.Model = usual, integrator: str = "euler") -> armrs.Simulated:
+def run(of: armrs.Model = usual, integrator: str = "euler", dt: float = problem.STEP) -> armrs.Simulated:
     """Simulate 20 s, recorded at 50 Hz."""
-    return armrs.simulate(of, movement, integrator=integrator, dt=problem.STEP, duration=problem.LONG)
+    return armrs.simulate(of, movement, integrator=integrator, dt=dt, duration=problem.LONG)
+
+
+def accurate(substeps: str) -> armrs.Simulated:
+    """Simulate 20 s right to an accuracy."""
+    return run(integrator="rk4", dt=problem.RECORD * problem.STEP / int(substeps))
 
 
 def write_fit() -> bool:
@@ -80,6 +85,8 @@ def batch(kernel: line.Task) -> dict[str, float]:
 
 line.serve(
     {
+        "accurate": lambda n: line.seconds_of(lambda: accurate(n)),
+        "check:accurate": lambda n: accurate(n).q.ravel().tolist(),
         "check:forward_dynamics": lambda: arm.forward_dynamics(q, qd, third).ravel().tolist(),
         "check:inverse_dynamics": lambda: arm.inverse_dynamics(q, qd, third).ravel().tolist(),
         "check:run": lambda: run().q.ravel().tolist(),

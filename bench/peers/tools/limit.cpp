@@ -124,40 +124,51 @@ template <class R> static inline void closed(const Arm<R> &arm, const Trig<R> &t
     accelerate(arm, t, speed, acting, out);
 }
 
-// Semi-implicit Euler; `record` gets joint angles at 50 Hz, lanes side by side. The handle's path from a table, or computed in every step.
-template <int W> static void run(const Arm<typename Wide<W>::R> &arm, const double *starts, long steps, double duration, const double *table, double *record) {
-    typedef typename Wide<W>::R R;
-    R link[3], speed[3] = {};
+// The handle's point with the polynomials above.
+static inline void own_handle_at(double time, double duration, double out[2]) {
+    const double s = fraction(time, duration);
+    double angle = 0.0;
+    out[0] = out[1] = 0.0;
+    for (int j = 0; j < 3; ++j) {
+        double sine, cosine;
+        angle += FROM_[j] + s * (TO_[j] - FROM_[j]);
+        sin_cos<1>(angle, sine, cosine);
+        out[0] += LENGTH_[j] * cosine;
+        out[1] += LENGTH_[j] * sine;
+    }
+}
+
+template <int W> static inline void begin(const double *starts, typename Wide<W>::R link[3]) {
     for (int j = 0; j < 3; ++j)
         for (int l = 0; l < W; ++l) {
             double angle = 0.0;
             for (int i = 0; i <= j; ++i) angle += starts[3 * l + i];
             lane(link[j], l) = angle;
         }
+}
+
+// Writes joint angles, lanes side by side; returns where the next go.
+template <int W> static inline double *write(const typename Wide<W>::R link[3], double *record) {
+    for (int j = 0; j < 3; ++j) {
+        auto q = j ? link[j] - link[j - 1] : link[0];
+        for (int l = 0; l < W; ++l) *record++ = lane(q, l);
+    }
+    return record;
+}
+
+// Semi-implicit Euler; `record` gets joint angles at 50 Hz, lanes side by side. The handle's path from a table, or computed in every step.
+template <int W> static void run(const Arm<typename Wide<W>::R> &arm, const double *starts, long steps, double duration, const double *table, double *record) {
+    typedef typename Wide<W>::R R;
+    R link[3], speed[3] = {};
+    begin<W>(starts, link);
     for (long i = 0;; ++i) {
-        if (i % RECORD == 0) {
-            for (int j = 0; j < 3; ++j) {
-                R q = j ? link[j] - link[j - 1] : link[0];
-                for (int l = 0; l < W; ++l) *record++ = lane(q, l);
-            }
-        }
+        if (i % RECORD == 0) record = write<W>(link, record);
         if (i == steps) return;
         double handle[2];
-        if (table) {
-            handle[0] = table[2 * i];
-            handle[1] = table[2 * i + 1];
-        } else {
-            const double s = fraction((double)i * STEP, duration);
-            double angle = 0.0;
-            handle[0] = handle[1] = 0.0;
-            for (int j = 0; j < 3; ++j) {
-                double sine, cosine;
-                angle += FROM_[j] + s * (TO_[j] - FROM_[j]);
-                sin_cos<1>(angle, sine, cosine);
-                handle[0] += LENGTH_[j] * cosine;
-                handle[1] += LENGTH_[j] * sine;
-            }
-        }
+        if (table)
+            memcpy(handle, table + 2 * i, sizeof handle);
+        else
+            own_handle_at((double)i * STEP, duration, handle);
         const Trig<R> t = trig<W>(link);
         R acceleration[3];
         closed(arm, t, link, speed, splat<R>(handle[0]), splat<R>(handle[1]), acceleration);
@@ -168,17 +179,144 @@ template <int W> static void run(const Arm<typename Wide<W>::R> &arm, const doub
     }
 }
 
+// The classical fourth-order method in `substeps` steps from one sample at 50 Hz to the next; the table is of half steps.
+template <int W>
+static void run_fourth(const Arm<typename Wide<W>::R> &arm, const double *starts, long substeps, double duration, const double *table, double *record) {
+    typedef typename Wide<W>::R R;
+    const double h = RECORD * STEP / (double)substeps;
+    const long steps = substeps * lround(duration / (RECORD * STEP));
+    R link[3], speed[3] = {};
+    begin<W>(starts, link);
+    const auto handle = [&](long half, double out[2]) {
+        if (table)
+            memcpy(out, table + 2 * half, 2 * sizeof(double));
+        else
+            own_handle_at(0.5 * h * (double)half, duration, out);
+    };
+    const auto slope = [&](const R l[3], const R v[3], const double at[2], R out[3]) __attribute__((always_inline)) {
+        closed(arm, trig<W>(l), l, v, splat<R>(at[0]), splat<R>(at[1]), out);
+    };
+    double from[2], middle[2], to[2];
+    handle(0, from);
+    for (long i = 0, left = 0;; ++i, --left) {
+        if (left == 0) {
+            record = write<W>(link, record);
+            left = substeps;
+        }
+        if (i == steps) return;
+        handle(2 * i + 1, middle);
+        handle(2 * i + 2, to);
+        R a[4][3], l[3], v[3][3];
+        slope(link, speed, from, a[0]);
+        for (int j = 0; j < 3; ++j) l[j] = link[j] + 0.5 * h * speed[j], v[0][j] = speed[j] + 0.5 * h * a[0][j];
+        slope(l, v[0], middle, a[1]);
+        for (int j = 0; j < 3; ++j) l[j] = link[j] + 0.5 * h * v[0][j], v[1][j] = speed[j] + 0.5 * h * a[1][j];
+        slope(l, v[1], middle, a[2]);
+        for (int j = 0; j < 3; ++j) l[j] = link[j] + h * v[1][j], v[2][j] = speed[j] + h * a[2][j];
+        slope(l, v[2], to, a[3]);
+        for (int j = 0; j < 3; ++j) {
+            link[j] += h * (speed[j] + h / 6.0 * (a[0][j] + a[1][j] + a[2][j]));
+            speed[j] += h / 6.0 * (a[0][j] + 2.0 * (a[1][j] + a[2][j]) + a[3][j]);
+        }
+        memcpy(from, to, sizeof from);
+    }
+}
+
 enum { LONG_STEPS = 80000, SHORT_STEPS = 8000, LONG_SAMPLES = LONG_STEPS / RECORD + 1, SHORT_SAMPLES = SHORT_STEPS / RECORD + 1 };
 static double *starts, *states, long_table[2 * (LONG_STEPS + 1)], short_table[2 * (SHORT_STEPS + 1)];
 static double long_record[3 * LONG_SAMPLES], batch_record[8 * 3 * SHORT_SAMPLES];
 
-template <int W> static void batch() {
+// The batch; where `all` is given, the angles of every run go there.
+template <int W, class Run> static void batch(Run one, double *all) {
     typedef typename Wide<W>::R R;
     for (int i = 0; i < RUNS; i += W) {
         R scale;
         for (int l = 0; l < W; ++l) lane(scale, l) = 1.0 + 1e-4 * (i + l);
-        run<W>(Arm<R>(scale), starts + 3 * (1 + i), SHORT_STEPS, SHORT, short_table, batch_record);
+        one(Arm<R>(scale), starts + 3 * (1 + i), batch_record);
+        for (int k = 0; all && k < 3 * SHORT_SAMPLES; ++k)
+            for (int l = 0; l < W; ++l) all[3 * SHORT_SAMPLES * (i + l) + k] = batch_record[W * k + l];
     }
+}
+
+template <int W> static void batch_euler(double *all = NULL) {
+    batch<W>([](const auto &arm, const double *from, double *to) { run<W>(arm, from, SHORT_STEPS, SHORT, short_table, to); }, all);
+}
+
+template <int W> static void batch_fourth(long substeps, const double *table, double *all = NULL) {
+    batch<W>([=](const auto &arm, const double *from, double *to) { run_fourth<W>(arm, from, substeps, SHORT, table, to); }, all);
+}
+
+// The time of a call, or what it has computed.
+#define ANSWER(check, call, values, count)            \
+    do {                                              \
+        if (check) {                                  \
+            call;                                     \
+            print_values(values, count);              \
+        } else {                                      \
+            double seconds_;                          \
+            SECONDS_OF(seconds_, call);               \
+            printf("{\"seconds\": %.9g}", seconds_);  \
+        }                                             \
+    } while (0)
+
+// Every fiftieth run, one after another.
+static void print_some(const double *all) {
+    static double some[RUNS / EVERY][3 * SHORT_SAMPLES];
+    for (int i = 0; i < RUNS / EVERY; ++i) memcpy(some[i], all + 3 * SHORT_SAMPLES * EVERY * i, sizeof some[i]);
+    print_values(some[0], sizeof some / sizeof(double));
+}
+
+static void answer_batch(int check, int width, long substeps) {
+    static double all[RUNS * 3 * SHORT_SAMPLES];
+    double *table = half_table(substeps, SHORT), seconds;
+    const auto call = [&](double *to) {
+        if (width == 1) batch_fourth<1>(substeps, table, to);
+        if (width == 4) batch_fourth<4>(substeps, table, to);
+        if (width == 8) batch_fourth<8>(substeps, table, to);
+    };
+    if (check) {
+        call(all);
+        print_some(all);
+    } else {
+        SECONDS_OF(seconds, call(NULL));
+        printf("{\"seconds\": %.9g}", seconds);
+    }
+    free(table);
+}
+
+// W2 and W3 right to an accuracy: `word` without its "accurate:" or "batch:accurate:". False where it is no such task.
+static int accurate(int check, const char *word) {
+    const Arm<double> arm(1.0);
+    const size_t count = 3 * LONG_SAMPLES;
+    long substeps;
+    if (!strcmp(word, "accurate:euler:80")) {
+        ANSWER(check, run<1>(arm, starts, LONG_STEPS, LONG, NULL, long_record), long_record, count);
+    } else if (sscanf(word, "accurate:rk4:%ld", &substeps) == 1) {
+        ANSWER(check, run_fourth<1>(arm, starts, substeps, LONG, NULL, long_record), long_record, count);
+    } else if (sscanf(word, "accurate:rk4_table:%ld", &substeps) == 1) {
+        double *table = half_table(substeps, LONG);
+        ANSWER(check, run_fourth<1>(arm, starts, substeps, LONG, table, long_record), long_record, count);
+        free(table);
+    } else if (!strcmp(word, "batch:accurate:euler:80")) {
+        double seconds;
+        static double all[RUNS * 3 * SHORT_SAMPLES];
+        if (check) {
+            batch_euler<4>(all);
+            print_some(all);
+        } else {
+            SECONDS_OF(seconds, batch_euler<4>());
+            printf("{\"seconds\": %.9g}", seconds);
+        }
+    } else if (sscanf(word, "batch:accurate:rk4_scalar:%ld", &substeps) == 1) {
+        answer_batch(check, 1, substeps);
+    } else if (sscanf(word, "batch:accurate:rk4_avx2:%ld", &substeps) == 1) {
+        answer_batch(check, 4, substeps);
+    } else if (sscanf(word, "batch:accurate:rk4_avx512:%ld", &substeps) == 1) {
+        answer_batch(check, 8, substeps);
+    } else {
+        return 0;
+    }
+    return 1;
 }
 
 // Kernels over all states, one call after another.
@@ -283,25 +421,25 @@ int main(void) {
             printf("{\"seconds\": %.9g}", seconds);
         } else if (!strcmp(word, "check:batch")) {
             // The last group of runs; the end of each.
-            batch<4>();
+            batch_euler<4>();
             double ends[12];
             for (int l = 0; l < 4; ++l)
                 for (int j = 0; j < 3; ++j) ends[3 * l + j] = batch_record[12 * (SHORT_SAMPLES - 1) + 4 * j + l];
             print_values(ends, 12);
         } else if (!strcmp(word, "batch:scalar")) {
-            SECONDS_OF(seconds, batch<1>());
+            SECONDS_OF(seconds, batch_euler<1>());
             printf("{\"seconds\": %.9g}", seconds);
         } else if (!strcmp(word, "batch:avx2")) {
-            SECONDS_OF(seconds, batch<4>());
+            SECONDS_OF(seconds, batch_euler<4>());
             printf("{\"seconds\": %.9g}", seconds);
         } else if (!strcmp(word, "batch:avx512")) {
-            SECONDS_OF(seconds, batch<8>());
+            SECONDS_OF(seconds, batch_euler<8>());
             printf("{\"seconds\": %.9g}", seconds);
         } else if (sscanf(word, "gram:scalar:%ld", &count) == 1) {
             answer_gram<1>(count);
         } else if (sscanf(word, "gram:avx2:%ld", &count) == 1) {
             answer_gram<4>(count);
-        } else {
+        } else if (!told_exactly(word) && !accurate(!strncmp(word, "check:", 6), word + (strncmp(word, "check:", 6) ? 0 : 6))) {
             printf("null");
         }
         printf("\n");

@@ -42,6 +42,35 @@ static void run(void) {
     }
 }
 
+// MuJoCo asks for the spring's point in every stage of a step.
+static const double *halves_;
+static void control(const mjModel *model, mjData *data) {
+    memcpy(data->ctrl, halves_ + 2 * lround(2.0 * data->time / model->opt.timestep), 2 * sizeof(double));
+}
+
+static int run_by(const char *method, long substeps, const double *halves) {
+    if (!strcmp(method, "rk4"))
+        led->opt.integrator = mjINT_RK4;
+    else if (!strcmp(method, "implicitfast"))
+        led->opt.integrator = mjINT_IMPLICITFAST;
+    else
+        return 0;
+    led->opt.timestep = RECORD * STEP / (double)substeps;
+    halves_ = halves;
+    mjcb_control = control;
+    mj_resetData(led, led_data);
+    memcpy(led_data->qpos, starts, 3 * sizeof(double));
+    for (int k = 0; k < LONG_SAMPLES; ++k) {
+        if (k)
+            for (long i = 0; i < substeps; ++i) mj_step(led, led_data);
+        memcpy(record + 3 * k, led_data->qpos, 3 * sizeof(double));
+    }
+    mjcb_control = NULL;
+    led->opt.timestep = STEP;
+    led->opt.integrator = mjINT_EULER;
+    return 1;
+}
+
 static mjModel *load(const char *name) {
     char path[4096], error[1000];
     snprintf(path, sizeof path, "%s/%s", FOLDER, name);

@@ -6,8 +6,10 @@ set to nothing through ctypes, and put back for the figures with it.
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import sys
+from functools import partial
 from pathlib import Path
 
 import line
@@ -107,6 +109,30 @@ def check_batch() -> list[float]:
     return states[:, -1, 1:4].ravel().tolist()
 
 
+INTEGRATORS = {"rk4": mujoco.mjtIntegrator.mjINT_RK4, "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST}
+
+
+def accurate(method: str, substeps: str, runs: range | None = None, check: bool = False) -> object:
+    """Time the single run or a part of the batch by another method and step, or return the angles at 50 Hz.
+
+    A roll-out holds what drives it over a step. For each method the path is taken where its error is smaller: at the middle of the step,
+    or for the one of first order at its start.
+    """
+    duration, step = (problem.SHORT if runs else problem.LONG), problem.RECORD * problem.STEP / int(substeps)
+    models, first = ([scaled(i) for i in runs], starts[1:][runs]) if runs else ([copy.copy(led)], starts[:1])
+    for model in models:
+        model.opt.integrator, model.opt.timestep = INTEGRATORS[method], step
+    steps = round(duration / step)
+    times = (np.arange(steps) + (0.5 if method == "rk4" else 0.0)) * step
+    path = problem.tip(problem.FROM + problem.fraction(times, duration)[:, None] * (problem.TO - problem.FROM))
+    initial, control = np.array([first_state(s) for s in first]), np.broadcast_to(path, (len(first), steps, 2))
+    if not check:
+        once = line.seconds_of(lambda: rollout.rollout(models, led_data, initial, control))
+        return {"seconds": once["seconds"] * (problem.RUNS / len(runs) if runs else 1.0)}
+    states, _ = rollout.rollout(models, led_data, initial, control)
+    return np.concatenate([first[:, None], states[:, int(substeps) - 1 :: int(substeps), 1:4]], axis=1).ravel().tolist()
+
+
 def fit() -> object:
     """Time the fit of viscosities and stiffnesses by simulation."""
     from scipy.optimize import least_squares
@@ -148,8 +174,16 @@ def with_clock(task: line.Task) -> line.Task:
 
 clock(False)
 timed = {"forward_dynamics": lambda: forward(False), "inverse_dynamics": inverse, "run": run, "batch": batch, "fit": fit}
+some = range(0, problem.RUNS, problem.EVERY)
+steps = {
+    f"{check}{part}accurate:{method}": partial(accurate, method, runs=runs, check=bool(check))
+    for check in ("", "check:")
+    for part, runs in (("", None), ("batch:", some))
+    for method in INTEGRATORS
+}
 line.serve(
     timed
+    | steps
     | {f"{name}:clock": with_clock(task) for name, task in timed.items()}
     | {"check:run": lambda: run(True), "check:forward_dynamics": lambda: forward(True), "check:batch": check_batch}
 )

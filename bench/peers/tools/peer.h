@@ -55,10 +55,31 @@ static inline void handle_at(double time, double duration, double out[2]) {
     }
 }
 
+// The handle's path at half of each of `substeps` steps from one recorded sample to the next. The caller frees it.
+static inline double *half_table(long substeps, double duration) {
+    const long count = 2 * substeps * lround(duration / (RECORD * STEP));
+    double *table = (double *)malloc(2 * (size_t)(count + 1) * sizeof(double));
+    for (long i = 0; i <= count; ++i) handle_at(0.5 * RECORD * STEP / (double)substeps * (double)i, duration, table + 2 * i);
+    return table;
+}
+
+// How often a call is made where its instructions are counted instead of its time; below zero where it is timed.
+static long exactly_ = -1;
+static inline int told_exactly(const char *word) {
+    if (sscanf(word, "exactly:%ld", &exactly_) != 1) return 0;
+    printf("true");
+    return 1;
+}
+
 // Repeats `call` for about a tenth of a second of processor time and gives the time of one, after one that does not count. A look at the clock costs
 // as much as some kernels: one for many calls where they are short.
 #define SECONDS_OF(result, call)                                 \
     do {                                                         \
+        if (exactly_ >= 0) {                                     \
+            for (long i_ = 0; i_ < exactly_; ++i_) call;         \
+            (result) = 0.0;                                      \
+            break;                                               \
+        }                                                        \
         call;                                                    \
         long calls_ = 0, between_ = 1;                           \
         const double start_ = cpu_seconds();                     \

@@ -13,11 +13,14 @@ use cpu_time::ProcessTime;
 use std::hint::black_box;
 use std::io::{BufRead, Write};
 use std::path::Path;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Masses that the cascade believes, relative to the truth, and how well: as in `problem.py`.
 const MASS_ERROR: [f64; 3] = [1.08, 0.92, 1.08];
 const KNOWN_WITHIN: f64 = 0.3;
+/// The accuracy of a batch is that of every fiftieth run.
+const EVERY: usize = 50;
 /// A belief so weak that the data alone decide, within the same bounds.
 const WEAK: f64 = 1e3;
 
@@ -49,7 +52,16 @@ fn wall_seconds_of<R>(call: impl FnMut() -> R) -> String {
     }))
 }
 
+/// How often a call is made where its instructions are counted instead of its time.
+static EXACTLY: OnceLock<u32> = OnceLock::new();
+
 fn repeated<R, C>(mut call: impl FnMut() -> R, now: fn() -> C, since: fn(&C) -> f64) -> f64 {
+    if let Some(&times) = EXACTLY.get() {
+        for _ in 0..times {
+            black_box(call());
+        }
+        return 0.0;
+    }
     black_box(call());
     let start = now();
     // A look at the clock costs as much as some kernels: one for many calls where they are short.
@@ -117,6 +129,10 @@ impl Peer {
     fn answer(&self, task: &str) -> String {
         let euler = Integrator::SemiImplicitEuler;
         match task.split(':').collect::<Vec<_>>()[..] {
+            ["exactly", times] => EXACTLY
+                .set(times.parse().expect("a number of calls"))
+                .is_ok()
+                .to_string(),
             ["check", "inverse_dynamics"] => {
                 joints_json(self.states.iter().map(|s| self.inverse(s)))
             }
@@ -145,6 +161,27 @@ impl Peer {
             ["run"] => self.run(euler, Some(0.02)),
             ["run", "ends"] => self.run(euler, Some(20.0)),
             ["run", "fourth"] => self.run(Integrator::Rk4, Some(0.02)),
+            ["accurate", substeps] => {
+                let experiment = accurate(&run(euler, 20.0, Some(0.02)), substeps);
+                seconds_of(|| simulate(black_box(&experiment)).expect("runs"))
+            }
+            ["check", "accurate", substeps] => {
+                recorded(&accurate(&run(euler, 20.0, Some(0.02)), substeps))
+            }
+            ["batch", "accurate", substeps] => {
+                let runs: Vec<_> = batch().iter().map(|run| accurate(run, substeps)).collect();
+                seconds_of(|| simulate_batch(black_box(&runs), 1))
+            }
+            ["check", "batch", "accurate", substeps] => {
+                let runs: Vec<_> = batch().iter().map(|run| accurate(run, substeps)).collect();
+                let done = simulate_batch(&runs, 1);
+                let some = done.iter().step_by(EVERY);
+                json(
+                    &some
+                        .flat_map(|run| run.as_ref().expect("runs").q.clone())
+                        .collect::<Vec<_>>(),
+                )
+            }
             ["check", "batch"] => {
                 let done = simulate_batch(&batch(), 1);
                 let ends = done[done.len() - 4..].iter().flat_map(|r| {
@@ -261,6 +298,14 @@ fn run(integrator: Integrator, duration: f64, interval: Option<f64>) -> Experime
     let mut experiment = models::human_experiment(duration, [0.0; 3]).expect("a sample experiment");
     experiment.integrator = integrator;
     experiment.output_interval = interval;
+    experiment
+}
+
+/// The experiment as it is run where its angles have to be right to an accuracy: in so many steps of fourth order from one sample to the next.
+fn accurate(experiment: &Experiment<3>, substeps: &str) -> Experiment<3> {
+    let mut experiment = experiment.clone();
+    experiment.integrator = Integrator::Rk4;
+    experiment.dt = 0.02 / substeps.parse::<f64>().expect("a number of steps");
     experiment
 }
 
