@@ -122,6 +122,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             Link::Compliant(contact)
                 if contact.has_no_play()
                     && self.base.is_none()
+                    && !self.heaves
                     && self.placement.is_none()
                     && self.others.is_empty() =>
             {

@@ -1,6 +1,7 @@
 //! The documented order of the integrators, and the error of the reference workload.
 
-use arm_sim::{Experiment, Integrator, models};
+use arm_core::effect::{Effect, Kind};
+use arm_sim::{Experiment, Integrator, models, simulate_batch};
 
 use crate::common::{largest, run, several_effects, smooth};
 
@@ -30,6 +31,42 @@ fn semi_implicit_euler_is_of_first_order() {
 fn rk4_is_of_fourth_order() {
     let order = order(&smooth(2.0), Integrator::Rk4, 2e-3);
     assert!((order - 4.0).abs() < 0.4, "order {order}");
+}
+
+/// An effect that does nothing, but is not linear in the motion of its joint, makes every step ask for all that acts.
+#[test]
+fn the_short_way_through_a_rig_leaves_nothing_out() {
+    let alter: [&dyn Fn(&mut Experiment<3>); 4] = [
+        &|_| {},
+        &|run| {
+            let heave = Effect::new(Kind::ShoulderHeave, 0).with(&[0.01, 0.02, 0.4, 0.3]);
+            run.effects.push(heave);
+        },
+        &|run| {
+            let ripple = Effect::new(Kind::RobotRipple, 0).with(&[0.002, 0.001, 3.0, 0.1]);
+            run.effects.push(ripple);
+        },
+        &|run| {
+            let moves = Effect::new(Kind::ShoulderMotion, 0).with(&[0.01, 0.02]);
+            run.effects.push(moves);
+        },
+    ];
+    for (which, alter) in alter.iter().enumerate() {
+        for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4] {
+            let mut short = smooth(1.0);
+            short.integrator = integrator;
+            alter(&mut short);
+            let mut long = short.clone();
+            long.effects
+                .push(Effect::new(Kind::CubicElastic, 1).with(&[0.0, 0.0]));
+            let runs = [run(&short), run(&long)];
+            assert_eq!(runs[0].q, runs[1].q, "{which}, {integrator:?}");
+            let beside = [short, long].map(|one| simulate_batch(&vec![one; 2], 1).remove(0));
+            for (beside, alone) in beside.iter().zip(&runs) {
+                assert_eq!(beside.as_ref().expect("runs").q, alone.q);
+            }
+        }
+    }
 }
 
 #[test]
