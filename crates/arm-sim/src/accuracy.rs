@@ -1,9 +1,10 @@
 //! Runs of which the angles are right to a stated accuracy: the step is found by comparing runs.
 //!
 //! On a uniform grid the error of the fourth-order method is `C hᵖ` at every sample, so that two runs with steps h and r h differ
-//! by `(rᵖ − 1)` times the error of the finer one (Richardson 1911). The order p is 4 where all is smooth. Elsewhere (dry friction,
-//! play, effects that are not linear) it is taken from three runs, and as 1 before there are three. Every decision follows
-//! from bits of the runs, so that the step is the same everywhere.
+//! by `(rᵖ − 1)` times the error of the finer one (Richardson 1911). The order p is 4 where all is smooth. Where something is not (dry
+//! friction, play, effects that are not linear), a run is compared with the two before it, and p is taken as 1: two runs may agree by
+//! chance while a reflex or a bound is crossed earlier in one. Every decision follows from bits of the runs, so that the step is the
+//! same everywhere.
 
 use std::ops::ControlFlow;
 
@@ -124,8 +125,6 @@ struct Coarser {
     /// Steps from sample to sample.
     steps: usize,
     angles: Vec<f64>,
-    /// How far it was from one that was coarser still \[rad\], and by how much its steps were shorter.
-    change: Option<(f64, f64)>,
 }
 
 /// The search for the step of one experiment.
@@ -140,7 +139,8 @@ struct Search<const N: usize> {
     /// Steps in that.
     steps: usize,
     is_smooth: bool,
-    coarser: Option<Coarser>,
+    /// The runs that the next one is compared with, the latest last.
+    coarser: Vec<Coarser>,
 }
 
 impl<const N: usize> Search<N> {
@@ -179,7 +179,7 @@ impl<const N: usize> Search<N> {
             interval,
             steps: 0,
             is_smooth: model.is_smooth(),
-            coarser: None,
+            coarser: Vec::new(),
         };
         search.experiment.integrator = Integrator::Rk4;
         search.experiment.columns = Columns::Motion;
@@ -211,33 +211,25 @@ impl<const N: usize> Search<N> {
             Ok(columns) => columns,
             // A step that is too long may end the run.
             Err(SimulationError::TooStiff { .. } | SimulationError::Diverged { .. }) => {
-                self.coarser = None;
+                self.coarser.clear();
                 self.experiment.columns = Columns::Motion;
                 return self.refine(2.0 * self.steps as f64).map(|()| None);
             }
             Err(error) => return Err(error.clone()),
         };
-        let change = self.coarser.as_ref().map(|coarser| {
-            let distance = coarser
-                .angles
-                .iter()
-                .zip(angles)
-                .map(|(a, b)| (a - b).abs());
-            let finer = self.steps as f64 / coarser.steps as f64;
-            (distance.fold(0.0, f64::max), finer)
-        });
-        let error =
-            change.map(|(change, finer)| change / (libm::pow(finer, self.order(change)) - 1.0));
+        let error = self.error(angles);
         if let Some(error) = error.filter(|error| *error <= self.accuracy) {
             let dt = self.experiment.dt;
             return Ok(Some(Resolved { dt, error }));
         }
         self.experiment.columns = self.columns;
         self.start_as_before([angles, speeds]);
-        self.coarser = Some(Coarser {
+        if self.coarser.len() == self.compared() {
+            self.coarser.remove(0);
+        }
+        self.coarser.push(Coarser {
             steps: self.steps,
             angles: angles.to_vec(),
-            change,
         });
         let least = FINER.0 * self.steps as f64;
         let foretold = error.map_or(least, |error| {
@@ -254,17 +246,25 @@ impl<const N: usize> Search<N> {
         Ok(None)
     }
 
-    /// The order of convergence that the latest change of the angles shows.
-    fn order(&self, change: f64) -> f64 {
-        if self.is_smooth {
-            return ORDER;
-        }
-        let before = self.coarser.as_ref().and_then(|coarser| coarser.change);
-        before
-            .map_or(1.0, |(before, finer)| {
-                libm::log(before / change) / libm::log(finer)
-            })
-            .clamp(1.0, ORDER)
+    /// How many runs one is compared with.
+    fn compared(&self) -> usize {
+        if self.is_smooth { 1 } else { 2 }
+    }
+
+    /// The largest error of the angles that the coarser runs tell; nothing where there are too few.
+    fn error(&self, angles: &[f64]) -> Option<f64> {
+        let order = if self.is_smooth { ORDER } else { 1.0 };
+        let beside = |coarser: &Coarser| {
+            let distance = coarser
+                .angles
+                .iter()
+                .zip(angles)
+                .map(|(a, b)| (a - b).abs());
+            let finer = self.steps as f64 / coarser.steps as f64;
+            distance.fold(0.0, f64::max) / (libm::pow(finer, order) - 1.0)
+        };
+        (self.coarser.len() == self.compared())
+            .then(|| self.coarser.iter().map(beside).fold(0.0, f64::max))
     }
 
     /// Takes at least so many steps from sample to sample.

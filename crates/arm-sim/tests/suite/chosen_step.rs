@@ -48,7 +48,7 @@ fn angles_are_right_to_what_was_asked_for_and_the_estimate_is_close() {
 }
 
 #[test]
-fn where_something_is_not_smooth_the_order_is_taken_from_the_runs() {
+fn where_something_is_not_smooth_the_accuracy_is_kept_too() {
     let mut experiment = sampled(smooth(2.0));
     experiment.effects = several_effects();
     for accuracy in [1e-4, 1e-6] {
