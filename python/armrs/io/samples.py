@@ -139,21 +139,18 @@ def _read_csv(path: Path) -> Samples:
             return Samples(names, [np.empty(0) for _ in names], csv_place(path))
         explain_csv(path, names)
         raise BadInput("file", Text(str(error).splitlines()[0]), "CSV with one number a cell") from None
-    samples = Samples(names, [_numbers(table.column(name)) for name in names], csv_place(path))
-    if any(_has_nan_text(table.column(name)) for name in names):
+    columns = [table.column(name) for name in names]
+    values = [_numbers(column) for column in columns]
+    # A NaN that was written out, rather than left empty.
+    if any(int(np.isnan(v).sum()) > c.null_count for v, c in zip(values, columns, strict=True)):
         explain_csv(path, names)
-    return samples
+    return Samples(names, values, csv_place(path))
 
 
 def _numbers(column: Any) -> np.ndarray:
-    """Return an Arrow column as float64 with NaN where it is null."""
-    return np.ascontiguousarray(column.to_numpy(), dtype=np.float64)
-
-
-def _has_nan_text(column: Any) -> bool:
-    """Tell whether a NaN was written out, rather than left empty."""
-    values = _numbers(column)
-    return int(np.isnan(values).sum()) > column.null_count
+    """Return an Arrow column of float64 with NaN where it is null; its own `to_numpy` would import pandas, which takes a second."""
+    chunks = [chunk.fill_null(np.nan) if chunk.null_count else chunk for chunk in column.chunks]
+    return np.concatenate([np.empty(0), *(np.from_dlpack(chunk) for chunk in chunks)])
 
 
 def explain_csv(path: Path, names: list[str], *, numbers: bool = True) -> None:
