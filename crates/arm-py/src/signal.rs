@@ -1,6 +1,8 @@
-//! The common low-pass and the derivatives behind it, for time series.
+//! The common low-pass and the derivatives behind it, for time series, and least squares within bounds.
 
 use arm_ident::regression::measured_motion::{self, low_pass};
+use arm_numerics::Matrix;
+use arm_numerics::least_squares::program::Program;
 use arm_numerics::signal::derivative;
 use numpy::ndarray::{Array1, Array2};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
@@ -55,4 +57,19 @@ pub fn displacement_of_base<'py>(
     let moved =
         measured_motion::displacement_of_base(&points, place, rate).map_err(identification)?;
     Ok(Array2::from_shape_fn((moved.len(), 2), |(i, a)| moved[i][a]).into_pyarray(py))
+}
+
+/// The least `‖a x − b‖²` with `low ≤ x ≤ high`; `a` is `(m, p)`.
+#[pyfunction]
+pub fn bounded_least_squares(
+    a: PyReadonlyArray2<'_, f64>,
+    b: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
+) -> PyResult<f64> {
+    let values = a.as_array();
+    let matrix = Matrix::from_fn(values.nrows(), values.ncols(), |i, j| values[(i, j)]);
+    let program = Program::new(matrix, b).and_then(|p| p.bounds(&low, &high));
+    let outcome = program.and_then(|p| p.solve()).map_err(identification)?;
+    Ok(outcome.objective)
 }

@@ -97,8 +97,6 @@ def unexplained(model: Model, motion: Motion) -> float:
     Bounded least squares over first moments and inertia near those of the model, and a spring, a constant moment, viscosity and dry
     friction in each joint. Above 1 where the torques are too small to carry the arm.
     """
-    from scipy.optimize import lsq_linear
-
     arm = _armrs.Arm.from_model(model)
     torque, segments, inertia, passive = _terms(arm, motion)
     weight = model.gravity * float(np.sum(np.abs(arm.first_moments)))
@@ -108,10 +106,10 @@ def unexplained(model: Model, motion: Motion) -> float:
     bounds += [(least * weight, most * weight) for _ in range(model.n_joints) for least, most in laws]
     # What matters of the tall system is its triangle.
     triangle: np.ndarray = np.linalg.qr(np.column_stack([*columns, torque]), mode="r")  # type: ignore[assignment]
-    low, high = (np.array(b) for b in zip(*bounds, strict=True))
-    solved = lsq_linear(triangle[:-1, :-1], triangle[:-1, -1], (low, high), method="bvls")
+    low, high = zip(*bounds, strict=True)
+    left = _armrs.bounded_least_squares(triangle[:-1, :-1], triangle[:-1, -1].tolist(), low, high)
     size = float(np.sum(torque**2))
-    return float(np.sqrt((2.0 * solved.cost + triangle[-1, -1] ** 2) / size)) if size > 0.0 else 1.0
+    return float(np.sqrt((left + triangle[-1, -1] ** 2) / size)) if size > 0.0 else 1.0
 
 
 def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | None:
