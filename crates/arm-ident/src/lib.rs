@@ -6,5 +6,6 @@ pub mod experiment_design;
 pub mod inference;
 pub mod regression;
 pub mod results;
+pub mod threads;
 
 pub use error::IdentError;

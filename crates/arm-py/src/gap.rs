@@ -10,6 +10,7 @@ use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::results as core;
 use arm_gap::results::{Asked, TrialFile, Version};
 use arm_gap::selection::model_discrimination::Contest;
+use arm_gap::threads::parallel;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
@@ -134,23 +135,26 @@ pub fn play(
         let session = call.session(chain)?;
         session.check().map_err(gap)?;
         let given = session.given();
-        let plays = (0..session.trials.len()).map(|i| {
-            let course = Arc::new(session.course(i).map_err(gap)?);
+        let files: Vec<&str> = call.trials.iter().map(|c| c.file.as_str()).collect();
+        let one = |i: usize| {
+            let course = Arc::new(session.course(i)?);
             // What cannot be simulated is told of below, with its trial.
             let believed = match own {
-                true => py.detach(|| session.in_trial((&given, &[]), &course)).ok(),
+                true => session.in_trial((&given, &[]), &course).ok(),
                 false => None,
             };
-            let file = (i, call.trials[i].file.as_str());
-            let mut trial = core::SimulatedTrial::measured(&session, file, &course);
+            let mut trial = core::SimulatedTrial::measured(&session, (i, files[i]), &course);
             let believed = believed.as_ref().unwrap_or(&given);
-            trial.shown[Version::Given as usize] =
-                py.detach(|| session.shown_in(believed, &course)).ok();
-            Ok(SimulatedTrial(trial.into()))
-        });
-        let plays = plays.collect();
+            trial.shown[Version::Given as usize] = session.shown_in(believed, &course).ok();
+            Ok(trial)
+        };
+        let threads = call.settings.threads;
+        let plays = py.detach(|| parallel(threads, files.len(), one));
         own::failed()?;
-        plays
+        let made = |play: Result<core::SimulatedTrial, GapError>| {
+            play.map(|trial| SimulatedTrial(trial.into())).map_err(gap)
+        };
+        plays.into_iter().map(made).collect()
     }
     let call = Call::of(rig, &trials, &settings);
     each_short_length!(&rig.arm.chain, c => run(py, c, &call, own))
@@ -183,7 +187,7 @@ pub fn find_gap(
         progress: Option<&Py<PyAny>>,
     ) -> PyResult<GapResult> {
         let session = call.session(chain)?;
-        let session = py.detach(|| session.with_base());
+        let session = py.detach(|| session.with_base(call.settings.threads));
         let callback = ProgressCallback::of(progress);
         let done = call.studied(py, &session, |s| s.search(&|w, s| callback.tell(w, s)));
         let (prepared, finding) = callback.or_raised(done)?;

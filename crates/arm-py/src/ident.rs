@@ -205,6 +205,7 @@ pub fn identify(
             },
             tolerance: settings.tolerance(),
             level: settings.level,
+            threads: 1,
         };
         let cascade = arm_ident::cascade::Options {
             cutoff: settings.cutoff,

@@ -47,7 +47,7 @@ impl<const N: usize> Session<N> {
     /// The same session with the passive base of joints without any law, as measured motion has it.
     ///
     /// Where the regression cannot be made the session stays as it is, and the search starts from the model as given.
-    pub fn with_base(mut self) -> Self {
+    pub fn with_base(mut self, threads: usize) -> Self {
         let joints: Vec<usize> = (0..N).filter(|&j| !self.has_law(j)).collect();
         let forces = self.trials.iter().all(|t| t.force_on_arm.is_some());
         if joints.is_empty() || !forces || self.swings_freely() {
@@ -64,16 +64,21 @@ impl<const N: usize> Session<N> {
             let options = Options {
                 motion,
                 tolerance: self.tolerance,
+                threads,
                 ..Options::default()
             };
             identify(&model, trials, &options)
         };
-        let Ok(mut found) = along(MotionSource::Measured, &self.trials) else {
+        // Test trials decide nothing.
+        let fit = self.first_repeats(usize::MAX);
+        let Ok(mut found) = along(MotionSource::Measured, &fit) else {
             return self;
         };
         let noisy = found.speed_noise.iter().any(|&noise| noise > NOISY);
         if noisy && self.comparison == ComparisonMode::Led {
-            found = along(MotionSource::Auto, &self.first_repeats()).unwrap_or(found);
+            // Two repeats tell what repeats differ by; to simulate all of them again and again would take longer than the search, which
+            // refits what it starts from with all.
+            found = along(MotionSource::Auto, &self.first_repeats(2)).unwrap_or(found);
         }
         let laws = self.hidden_by_friction(estimated(&found), (&found, &model));
         let still = match self.comparison {
@@ -118,17 +123,14 @@ impl<const N: usize> Session<N> {
         self
     }
 
-    /// The first fit trials of each movement. The search starts from what these tell and refits it with all; two tell what repeats differ
-    /// by, and to simulate all of them again and again would take longer than the search.
-    fn first_repeats(&self) -> Vec<Trial<N>> {
-        /// Of each movement.
-        const REPEATS: usize = 2;
+    /// The first fit trials of each movement.
+    fn first_repeats(&self, most: usize) -> Vec<Trial<N>> {
         let mut taken = BTreeMap::new();
         let fit = self.trials.iter().filter(|t| t.role == Role::Fit);
         fit.filter(|t| {
             let count = taken.entry(t.configuration).or_insert(0);
             *count += 1;
-            *count <= REPEATS
+            *count <= most
         })
         .cloned()
         .collect()
@@ -340,7 +342,7 @@ mod tests {
             ..one.clone()
         })
         .collect();
-        let taken: Vec<f64> = session.first_repeats().iter().map(|t| t.rate).collect();
+        let taken: Vec<f64> = session.first_repeats(2).iter().map(|t| t.rate).collect();
         assert_eq!(taken, [100.0, 102.0, 103.0]);
     }
 

@@ -88,7 +88,8 @@ impl SimulatedTrial {
         // Without the passive base.
         let mut given = session.given();
         given.known.truncate(session.effects.len());
-        let one = |(i, course): (usize, &Course<N>)| {
+        let one = |i: usize| {
+            let course = prepared.courses[i].as_ref();
             let mut trial = Self::measured(session, (i, &asked.trials[i].file), course);
             trial.group = prepared.group_of[i];
             let own = plays
@@ -100,8 +101,7 @@ impl SimulatedTrial {
             }
             trial
         };
-        let courses = prepared.courses.iter().map(AsRef::as_ref);
-        courses.enumerate().map(one).collect()
+        prepared.parallel(prepared.courses.len(), one)
     }
 
     /// What a version shows.

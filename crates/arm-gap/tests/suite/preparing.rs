@@ -208,7 +208,7 @@ fn laws_of_the_base_are_likely_where_measured_motion_shows_them() {
     let of = |kind: &str, index, values: &[f64]| {
         Effect::new(Kind::named(kind).expect("known"), index).with(values)
     };
-    let session = without_laws(&[of("coulomb", 1, &[0.3, 0.01])]).with_base();
+    let session = without_laws(&[of("coulomb", 1, &[0.3, 0.01])]).with_base(1);
     let law = |kind: &str, joint: usize| {
         let kind = Kind::named(kind).expect("known");
         let own = |p: &&arm_gap::data::passive_law::Passive| {
@@ -226,7 +226,7 @@ fn laws_of_the_base_are_likely_where_measured_motion_shows_them() {
     };
     assert_eq!((rest.sd, size.step), (1.0, 0.01 * size.sd));
     // The model has a law: nothing is asked of its joints.
-    assert!(quiet().with_base().base.is_empty());
+    assert!(quiet().with_base(1).base.is_empty());
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn calibration_starts_no_further_than_three_standard_deviations_from_the_literat
     });
     let (base, gravity) = (session.chain.base(), session.chain.gravity());
     session.chain = arm_core::Chain::new(light, base, gravity).expect("a possible arm");
-    let start = session.with_base().start;
+    let start = session.with_base(1).start;
     let furthest = start
         .iter()
         .flatten()
@@ -257,7 +257,7 @@ fn a_joint_that_hardly_moves_is_held_and_nothing_is_asked_of_it() {
                 q[1] = 0.8 + range * (i as f64 / count);
             }
         }
-        let session = session.with_base();
+        let session = session.with_base(1);
         let own = session.base.iter().filter(|p| p.effect.index == 1);
         let friction = own
             .clone()

@@ -54,7 +54,7 @@ fn nothing_is_named_where_nothing_is_hidden() {
 fn little_known(effects: &[Effect<f64>]) -> Session<2> {
     let mut session = session(effects, (1e-3, 0.1));
     session.effects.clear();
-    session.with_base()
+    session.with_base(1)
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn whole_trials_tell_whether_friction_sticks_or_creeps() {
         ];
         let mut session = session(&hidden, (3e-4, 0.03));
         session.effects = Vec::new();
-        let session = session.with_base();
+        let session = session.with_base(1);
         let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
         let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
         let named = &finding.amended.hypothesis.named;

@@ -9,6 +9,7 @@ use crate::regression::measured_motion::{candidates_of_measured, measured};
 use crate::regression::preprocessing::{LEAST_SHARE, Noise, Thinning};
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::Unknown;
+use crate::threads::parallel;
 use arm_numerics::{Condenser, Factor};
 
 /// A lower cutoff is preferred while its relative residual is within this factor of the best.
@@ -23,18 +24,18 @@ const NEARLY_BEST: f64 = 1.1;
 pub(crate) fn best_cutoff<const N: usize>(
     model: &Model<N>,
     unknowns: &[Unknown],
-    fit: &[&Trial<N>],
+    (fit, threads): (&[&Trial<N>], usize),
 ) -> Result<f64, IdentError> {
     let scale_free = fit.iter().all(|t| t.is_unloaded());
-    let mut scored = Vec::new();
-    for cutoff in candidates_of_measured(fit)? {
-        let data = condensed(
-            &widened(model, fit.iter().copied(), cutoff),
-            unknowns,
-            (fit, cutoff),
-        )?;
-        scored.push((cutoff, misfit(&data, (model, unknowns), scale_free)?));
-    }
+    let cutoffs = candidates_of_measured(fit)?;
+    let scored = parallel(threads, cutoffs.len(), |i| {
+        let cutoff = cutoffs[i];
+        let model_there = widened(model, fit.iter().copied(), cutoff);
+        let data = condensed(&model_there, unknowns, (fit, cutoff))?;
+        let misfit = misfit(&data, (model, unknowns), scale_free)?;
+        Ok::<_, IdentError>((cutoff, misfit))
+    });
+    let scored = scored.into_iter().collect::<Result<Vec<_>, _>>()?;
     let best = scored.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
     Ok(scored
         .iter()

@@ -18,6 +18,7 @@ use crate::regression::sensitivity::{HELD, damped};
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
 use crate::regression::unknown::{Imperfection, Moment, Source, Unknown, spring, unknowns};
+use crate::threads::parallel;
 use arm_core::Chain;
 use arm_core::effect::Effect;
 use arm_numerics::NumericsError;
@@ -57,6 +58,8 @@ pub struct Options {
     pub tolerance: Tolerance,
     /// Probability of the intervals.
     pub level: f64,
+    /// Threads over which the trials of a round are spread; the result has the same bits for any number.
+    pub threads: usize,
 }
 
 impl Default for Options {
@@ -66,6 +69,7 @@ impl Default for Options {
             motion: MotionSource::Auto,
             tolerance: Tolerance::default(),
             level: 0.95,
+            threads: 1,
         }
     }
 }
@@ -106,6 +110,7 @@ pub fn identify<const N: usize>(
         cutoff: candidates(&fit)[0],
         simulate: false,
         scale_free,
+        threads: options.threads,
     };
     let (task, found, not_simulated) = task.found(model, options)?;
     let Task {
@@ -147,6 +152,7 @@ struct Task<'a, const N: usize> {
     cutoff: f64,
     simulate: bool,
     scale_free: bool,
+    threads: usize,
 }
 
 /// Where rounds of a fit ended.
@@ -258,7 +264,7 @@ impl<const N: usize> Task<'_, N> {
     ) -> Result<(Self, Settled<N>), IdentError> {
         self.cutoff = match cutoff {
             Some(cutoff) => cutoff,
-            None => best_cutoff(model, self.unknowns, self.fit)?,
+            None => best_cutoff(model, self.unknowns, (self.fit, self.threads))?,
         };
         let found = self.settle(model.clone())?;
         Ok((self, found))
@@ -304,6 +310,7 @@ impl<const N: usize> Task<'_, N> {
             cutoff,
             simulate,
             scale_free,
+            threads,
         } = *self;
         let mut current = start.clone();
         let (mut last, mut prepared): (Option<Solved>, Vec<Pieces>) = (None, Vec::new());
@@ -314,7 +321,8 @@ impl<const N: usize> Task<'_, N> {
                 .map_or(0.0, |before| delay(unknowns, &before.outcome.x));
             // Rows take most of the memory: those of the last round make room first.
             prepared.clear();
-            prepared = match prepare(&current, unknowns, trials, (cutoff, simulate, delay)) {
+            let how = (cutoff, simulate, delay);
+            prepared = match prepare((&current, unknowns), trials, how, threads) {
                 Ok(prepared) => prepared,
                 // A step too far makes an arm that cannot be simulated: half of it is a step too.
                 Err(error) if last.is_some() => {
@@ -437,17 +445,18 @@ fn moved(solved: &Solved, before: &Solved) -> f64 {
 
 /// Filtered rows of every trial.
 fn prepare<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
+    (model, unknowns): (&Model<N>, &[Unknown]),
     trials: &[Trial<N>],
     (cutoff, simulate, delay): (f64, bool, f64),
+    threads: usize,
 ) -> Result<Vec<Pieces>, IdentError> {
     let model = if simulate {
         model.clone()
     } else {
         widened(model, fit_trials(trials), cutoff)
     };
-    let of_trial = |(k, trial): (usize, &Trial<N>)| {
+    let of_trial = |k: usize| {
+        let trial = &trials[k];
         // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
         if !simulate || (trial.role == Role::Test && !can_simulate(trial)) {
             let motion = measured(trial, cutoff)?;
@@ -463,7 +472,8 @@ fn prepare<const N: usize>(
         })?;
         Ok(apart(pieces, unknowns.len()))
     };
-    trials.iter().enumerate().map(of_trial).collect()
+    let prepared = parallel(threads, trials.len(), of_trial);
+    prepared.into_iter().collect()
 }
 
 /// The trials that are fitted.

@@ -11,7 +11,7 @@ pub fn exactly() -> Options {
         cutoff: Some(20.0),
         motion: MotionSource::Measured,
         tolerance: EXACT,
-        level: 0.95,
+        ..Options::default()
     }
 }
 

@@ -32,8 +32,9 @@ fn run(threads: usize, jobs: usize, one: &(dyn Fn(usize) + Sync)) {
         }
     };
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.min(jobs)).map(|_| scope.spawn(work)).collect();
-        for worker in workers {
+        let others: Vec<_> = (1..threads.min(jobs)).map(|_| scope.spawn(work)).collect();
+        work();
+        for worker in others {
             worker
                 .join()
                 .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
