@@ -1,5 +1,7 @@
 //! All questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
 
+use std::sync::OnceLock;
+
 use arm_core::effect::{Effect, Kind, Local, MAX_STATES, Nature, Part, Place, Values};
 use arm_core::{Contact, Setup, models};
 use arm_numerics::statistics::extent::extent;
@@ -12,6 +14,7 @@ use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::response::Response;
+use crate::sensitivity::rows::{Columns, Rows};
 
 /// All candidates of a session with their responses; those that the movements do not excite are left out.
 pub struct Library {
@@ -19,6 +22,8 @@ pub struct Library {
     pub candidates: Vec<Candidate>,
     /// Responses to the columns of each.
     pub responses: Vec<Vec<Response>>,
+    /// The same, made white once they are asked.
+    pub(crate) columns: OnceLock<Columns>,
 }
 
 impl Library {
@@ -108,7 +113,18 @@ impl Library {
         Ok(Self {
             candidates: kept,
             responses,
+            columns: OnceLock::new(),
         })
+    }
+
+    /// The responses in the rows of the anchor, made white once for all that is asked there.
+    pub(crate) fn columns<const N: usize>(
+        &self,
+        prepared: &PreparedSession<N>,
+        rows: &Rows,
+    ) -> &Columns {
+        let all = || self.responses.iter().flatten().collect::<Vec<_>>();
+        self.columns.get_or_init(|| rows.columns(prepared, &all()))
     }
 
     /// Adds named effects in the shapes that they have; where each stands, and the coefficients of its columns.
@@ -122,6 +138,7 @@ impl Library {
         named: &[(Candidate, Effect<f64>)],
     ) -> Result<Vec<Option<Twin>>, GapError> {
         let mut places = Vec::new();
+        self.columns = OnceLock::new();
         for (own, mut effect) in named.iter().cloned() {
             let mut sizes: Vec<f64> = own.free.iter().map(|&p| effect.parameters[p]).collect();
             if let Some(rest) = own.rest {

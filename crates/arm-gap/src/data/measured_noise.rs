@@ -12,6 +12,7 @@ use crate::measurement_model::prediction::Channels;
 use crate::selection::fit::{Fitted, decided};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::response::Response;
+use crate::sensitivity::rows::Columns;
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// Reads the noise anew: what repeats differ in, or without repeats what a hypothesis leaves.
@@ -55,7 +56,8 @@ impl<const N: usize> PreparedSession<'_, N> {
     ) -> Result<(), GapError> {
         let named = self.responses_at(point, &fitted.hypothesis, &fitted.named())?;
         let each: Vec<&Response> = named.iter().collect();
-        let (coordinates, clusters) = self.equations_with(point, fitted, &each);
+        let (coordinates, clusters) =
+            self.equations_with(point, fitted, (&each, &Columns::default()));
         let Some((free, factor)) = decided(fitted, &coordinates, &clusters) else {
             return Ok(());
         };

@@ -7,10 +7,11 @@ use crate::candidates::candidate::Candidate;
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
 use crate::measurement_model::prediction::Channels;
-use crate::selection::score_variance::spread;
+use crate::selection::score_variance::{spread, told};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
 use crate::sensitivity::response::Response;
+use crate::sensitivity::rows::Columns;
 
 /// Most steps of a fit.
 const STEPS: usize = 6;
@@ -111,22 +112,23 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
-        more: &[&Response],
+        more: &Columns,
     ) -> Result<(Vec<Coordinate>, Vec<Cluster>), GapError> {
         let own = fitted.named();
         let responses = self.responses_at(point, &fitted.hypothesis, &own)?;
-        let extra: Vec<_> = responses.iter().chain(more.iter().copied()).collect();
-        Ok(self.equations_with(point, fitted, &extra))
+        let each: Vec<_> = responses.iter().collect();
+        Ok(self.equations_with(point, fitted, (&each, more)))
     }
 
-    /// The same with responses that are known.
+    /// The same with responses of the named effects that are known.
     pub(crate) fn equations_with(
         &self,
         point: &LinearizationPoint<N>,
         fitted: &Fitted<N>,
-        responses: &[&Response],
+        columns: (&[&Response], &Columns),
     ) -> (Vec<Coordinate>, Vec<Cluster>) {
-        let clusters = point.rows.clusters(self, responses, &fitted.residuals);
+        let rows = &point.rows;
+        let clusters = rows.clusters_beside(self, columns, &fitted.residuals);
         let own = fitted.named();
         let coordinates = point.coordinates.iter().copied().chain(own).collect();
         (coordinates, clusters)
@@ -156,7 +158,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 break;
             };
             let each: Vec<&Response> = responses.iter().collect();
-            let (coordinates, clusters) = self.equations_with(point, &fitted, &each);
+            let (coordinates, clusters) =
+                self.equations_with(point, &fitted, (&each, &Columns::default()));
             let equations = Equations::new(&clusters, hypothesis, &coordinates);
             let next = |step: &Step| {
                 let along = step.usable.iter().map(|&i| &coordinates[i]);
@@ -199,7 +202,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         fitted: &Fitted<N>,
     ) -> Result<f64, GapError> {
         let hypothesis = &fitted.hypothesis;
-        let (coordinates, clusters) = self.equations(point, fitted, &[])?;
+        let (coordinates, clusters) = self.equations(point, fitted, &Columns::default())?;
         let mut sum = 0.0;
         for (out, cluster) in clusters.iter().enumerate() {
             let others: Vec<Cluster> = clusters
@@ -400,7 +403,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         fitted: &Fitted<N>,
         scale: f64,
     ) -> Result<Precision, GapError> {
-        match self.equations(point, fitted, &[]) {
+        match self.equations(point, fitted, &Columns::default()) {
             // Where a small change of what was found cannot be simulated, nothing can be said of how well it is known.
             Err(GapError::Simulation { .. }) => {
                 let mut coordinates = point.coordinates.clone();
@@ -435,7 +438,7 @@ fn precision_of<const N: usize>(
         for (a, &i) in free.iter().enumerate() {
             let row = free.iter().enumerate();
             let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
-            let widen = f64::max(scale, spread(&clusters, &weights));
+            let widen = f64::max(scale, spread(&told(&clusters, &weights)));
             sd[i] = (inverse[(a, a)] * widen).sqrt();
         }
     }

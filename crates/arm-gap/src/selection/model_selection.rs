@@ -143,8 +143,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         fitted: &mut Fitted<N>,
         point: &LinearizationPoint<N>,
     ) -> Result<Vec<Fitted<N>>, GapError> {
-        let each = (0..fitted.asked.len()).map(|slot| self.without(fitted, slot, point));
-        let each = each.collect::<Result<Vec<_>, _>>()?;
+        let each = self.parallel(fitted.asked.len(), |slot| self.without(fitted, slot, point));
+        let each = each.into_iter().collect::<Result<Vec<_>, _>>()?;
         for (candidate, less) in std::iter::zip(&mut fitted.asked, &each) {
             candidate.gained = less.cost - fitted.cost;
         }
@@ -406,34 +406,27 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             singles.extend(both.filter(|(part, ..)| *part > RIVAL));
         }
         singles.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut seen: Vec<&Candidate> = Vec::new();
-        let mut rivals = Vec::new();
-        for (_, choice, (score_test, from)) in &singles {
-            let candidate = &library.candidates[choice.members[0]];
-            if seen.iter().any(|s| s.is_same_effect(&candidate.effect)) {
-                continue;
+        // The best of each effect.
+        let candidate = |choice: &Choice| &library.candidates[choice.members[0]];
+        let mut best: Vec<&(f64, Choice, (&ScoreTest, &Fitted<N>))> = Vec::new();
+        for single in &singles {
+            let effect = &candidate(&single.1).effect;
+            if best.len() < RIVALS && !best.iter().any(|b| candidate(&b.1).is_same_effect(effect)) {
+                best.push(single);
             }
-            if seen.len() >= RIVALS {
-                break;
-            }
-            seen.push(candidate);
-            let mut asked = candidate.clone();
+        }
+        let rival = |place: usize| {
+            let (_, choice, (score_test, from)) = best[place];
             let member = choice.members[0];
+            let mut asked = candidate(choice).clone();
             (asked.price, asked.spread) = (score_test.price[member], score_test.spread[member]);
-            let Some(rival) = self.attempt(
-                from,
-                (std::slice::from_ref(&asked), &choice.coefficients),
-                point,
-            ) else {
-                continue;
-            };
-            let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
-            let likeness = twin.map_or(0.0, |t| score_test.likeness(t.place, choice.members[0]));
+            let choice = (std::slice::from_ref(&asked), choice.coefficients.as_slice());
+            let rival = self.attempt(from, choice, point)?;
             let effect = rival.hypothesis.named.last().copied();
-            let Some(effect) = effect.filter(|effect| !asked.is_plainer(effect)) else {
-                continue;
-            };
-            rivals.push(Rival {
+            let effect = effect.filter(|effect| !asked.is_plainer(effect))?;
+            let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
+            let likeness = twin.map_or(0.0, |t| score_test.likeness(t.place, member));
+            Some(Rival {
                 alternative: Alternative {
                     candidate: asked,
                     effect,
@@ -441,8 +434,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     likeness,
                 },
                 fitted: rival,
-            });
-        }
+            })
+        };
+        let rivals = self.parallel(best.len(), rival);
+        let mut rivals: Vec<_> = rivals.into_iter().flatten().collect();
         rivals.sort_by(|a, b| a.alternative.worse.total_cmp(&b.alternative.worse));
         Ok(rivals)
     }

@@ -39,6 +39,7 @@ struct Term {
 }
 
 /// A law of the passive base that is named.
+#[derive(Clone)]
 pub(crate) struct BaseLaw<const N: usize> {
     /// Its place in the base.
     pub base: usize,
@@ -379,10 +380,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .map(|&l| (laws[l].question.clone(), effect(l)))
                 .collect();
             let twins = library.add_named(self, point, &named)?;
-            for (&l, twin) in own.iter().zip(&twins) {
-                let known = first + laws[l].base;
+            let judged = self.parallel(own.len(), |i| {
+                let mut law = laws[own[i]].clone();
+                let known = first + law.base;
                 let held = point.holding(|t| matches!(t, Target::Known(e, _) if e == known));
-                let law = &mut laws[l];
                 let mut as_named = fitted.clone();
                 as_named
                     .hypothesis
@@ -390,7 +391,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     .push(fitted.hypothesis.known[known]);
                 as_named.hypothesis.known[known].parameters[0] = 0.0;
                 as_named.asked.push(law.question.clone());
-                self.judge_base_law(law, (&as_named, twin.as_ref()), (&held, &library), scale);
+                let as_named = (&as_named, twins[i].as_ref());
+                self.judge_base_law(&mut law, as_named, (&held, &library), scale);
+                law
+            });
+            for (&l, law) in own.iter().zip(judged) {
+                laws[l] = law;
             }
         }
         Ok(laws)

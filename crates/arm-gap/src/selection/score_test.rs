@@ -9,10 +9,9 @@ use crate::candidates::library::{Library, Twin};
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, priors};
 use crate::selection::fit::{Fitted, regularise};
-use crate::selection::score_variance::{spread, unlike};
+use crate::selection::score_variance::{spread, told, unlike};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Normal, solve};
-use crate::sensitivity::response::Response;
 
 /// The candidates' normal equations after everything else was projected off.
 pub struct ScoreTest {
@@ -64,15 +63,15 @@ impl ScoreTest {
         library: &Library,
     ) -> Result<Self, GapError> {
         let hypothesis = &fitted.hypothesis;
-        let asked: Vec<&Response> = library.responses.iter().flatten().collect();
-        let (known, clusters) = prepared.equations(point, fitted, &asked)?;
+        let count = library.responses.iter().map(Vec::len).sum();
+        let columns = library.columns(prepared, &point.rows);
+        let (known, clusters) = prepared.equations(point, fitted, columns)?;
         let mut prior = priors(hypothesis, &known);
-        prior.resize(known.len() + asked.len(), None);
+        prior.resize(known.len() + count, None);
         let mut normal = Normal::new(&clusters, &prior);
         regularise(&mut normal.gram, hypothesis, &known);
         let base = projected_off(&normal, &known, hypothesis);
         let first = known.len();
-        let count = asked.len();
         let solver = Cholesky::new(normal.gram.select(&base, &base)).ok_or(GapError::Singular {
             unknowns: base.len(),
         })?;
@@ -114,10 +113,8 @@ impl ScoreTest {
                 .map(Candidate::least_of_sum)
                 .collect(),
         };
-        for index in 0..score_test.columns.len() {
-            let Some(choice) = score_test.evaluate(&[index]) else {
-                continue;
-            };
+        let scattered = prepared.parallel(score_test.columns.len(), |index| {
+            let choice = score_test.evaluate(&[index])?;
             // The direction in which the candidate was found, on its columns and on what was projected off.
             let range = score_test.columns[index].clone();
             let found: Vec<(usize, f64)> = range.zip(choice.coefficients[0].clone()).collect();
@@ -127,8 +124,13 @@ impl ScoreTest {
                 (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(a, *c)]))
             });
             let weights: Vec<(usize, f64)> = own.chain(others).collect();
-            score_test.spread[index] = spread(&clusters, &weights);
-            score_test.unlike[index] = unlike(&clusters, &weights);
+            let told = told(&clusters, &weights);
+            Some((spread(&told), unlike(&told)))
+        });
+        for (index, found) in scattered.into_iter().enumerate() {
+            if let Some(found) = found {
+                (score_test.spread[index], score_test.unlike[index]) = found;
+            }
         }
         Ok(score_test)
     }

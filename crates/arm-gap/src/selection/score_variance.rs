@@ -1,22 +1,54 @@
 //! How much scores scatter between repeats, beside what the noise allows.
 
+use std::sync::Arc;
+
 use crate::sensitivity::normal_equations::Cluster;
 
 /// Weight of "as the noise says", in trials.
 const BELIEF: f64 = 6.0;
 
-/// By how much movements differ in the size that they give an effect, beyond what the noise makes: the part of their squared
-/// distances from the common size that exceeds what chance makes in one of a thousand.
+/// What one trial says of an effect.
+pub struct Told {
+    /// The movement; repeats share it.
+    configuration: usize,
+    /// Product of the residual with the effect.
+    score: f64,
+    /// Variance of that product where the noise is as believed.
+    expected: f64,
+}
+
+/// What each trial says of an effect.
 ///
 /// * `weights` - columns and their weights in the effect as all movements together tell it
-pub fn unlike(clusters: &[Cluster], weights: &[(usize, f64)]) -> f64 {
-    let groups = clusters.iter().map(|c| c.configuration + 1).max();
+pub fn told(clusters: &[Cluster], weights: &[(usize, f64)]) -> Vec<Told> {
+    let mut all: Vec<Told> = Vec::with_capacity(clusters.len());
+    for (i, c) in clusters.iter().enumerate() {
+        // Repeats with the same samples share their products.
+        let same = (0..i).rfind(|&k| Arc::ptr_eq(&clusters[k].gram, &c.gram));
+        all.push(Told {
+            configuration: c.configuration,
+            score: weights.iter().fold(0.0, |s, (i, w)| s + w * c.score[*i]),
+            expected: same.map_or_else(|| expected(c, weights), |k| all[k].expected),
+        });
+    }
+    all
+}
+
+fn expected(c: &Cluster, weights: &[(usize, f64)]) -> f64 {
+    weights.iter().fold(0.0, |s, (i, w)| {
+        let row = weights.iter();
+        s + w * row.fold(0.0, |t, (j, v)| t + v * c.gram[(*i, *j)])
+    })
+}
+
+/// By how much movements differ in the size that they give an effect, beyond what the noise makes: the part of their squared
+/// distances from the common size that exceeds what chance makes in one of a thousand.
+pub fn unlike(told: &[Told]) -> f64 {
+    let groups = told.iter().map(|t| t.configuration + 1).max();
     let (mut square, mut dof) = (0.0, -1.0);
     for group in 0..groups.unwrap_or(0) {
-        let own = clusters.iter().filter(|c| c.configuration == group);
-        let (score, information) = own.fold((0.0, 0.0), |(s, i), c| {
-            (s + score(c, weights), i + expected(c, weights))
-        });
+        let own = told.iter().filter(|t| t.configuration == group);
+        let (score, information) = own.fold((0.0, 0.0), |(s, i), t| (s + t.score, i + t.expected));
         if information > 0.0 {
             square += (score - information) * (score - information) / information;
             dof += 1.0;
@@ -31,38 +63,20 @@ pub fn unlike(clusters: &[Cluster], weights: &[(usize, f64)]) -> f64 {
     (square - dof * root * root * root).max(0.0)
 }
 
-/// Product of a trial's residual with an effect.
-fn score(c: &Cluster, weights: &[(usize, f64)]) -> f64 {
-    weights.iter().fold(0.0, |s, (i, w)| s + w * c.score[*i])
-}
-
-/// Variance of that product where the noise is as believed.
-fn expected(c: &Cluster, weights: &[(usize, f64)]) -> f64 {
-    weights.iter().fold(0.0, |s, (i, w)| {
-        let row = weights.iter();
-        s + w * row.fold(0.0, |t, (j, v)| t + v * c.gram[(*i, *j)])
-    })
-}
-
 /// Variance of a score between repeats of one movement over what the noise allows, shrunk towards one; at least one.
-///
-/// * `weights` - columns and their weights in the score
-pub fn spread(clusters: &[Cluster], weights: &[(usize, f64)]) -> f64 {
-    let groups = clusters.iter().map(|c| c.configuration + 1).max();
+pub fn spread(told: &[Told]) -> f64 {
+    let groups = told.iter().map(|t| t.configuration + 1).max();
     let (mut observed, mut predicted, mut dof) = (0.0, 0.0, 0.0);
     for group in 0..groups.unwrap_or(0) {
-        let own: Vec<&Cluster> = clusters
-            .iter()
-            .filter(|c| c.configuration == group)
-            .collect();
+        let own: Vec<&Told> = told.iter().filter(|t| t.configuration == group).collect();
         if own.len() < 2 {
             continue;
         }
         let n = own.len() as f64;
-        let scores: Vec<f64> = own.iter().map(|c| score(c, weights)).collect();
-        let mean = scores.iter().sum::<f64>() / n;
-        observed += scores.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>();
-        predicted += own.iter().map(|c| expected(c, weights)).sum::<f64>() / n * (n - 1.0);
+        let mean = own.iter().map(|t| t.score).sum::<f64>() / n;
+        let squares = own.iter().map(|t| (t.score - mean) * (t.score - mean));
+        observed += squares.sum::<f64>();
+        predicted += own.iter().map(|t| t.expected).sum::<f64>() / n * (n - 1.0);
         dof += n - 1.0;
     }
     if predicted <= 0.0 {
@@ -73,14 +87,12 @@ pub fn spread(clusters: &[Cluster], weights: &[(usize, f64)]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use arm_numerics::Matrix;
 
     use super::*;
 
     /// Trials of several movements that give one effect these sizes, each known to a fifth.
-    fn told(sizes: &[f64]) -> Vec<Cluster> {
+    fn trials(sizes: &[f64]) -> Vec<Cluster> {
         const INFORMATION: f64 = 25.0;
         let one = |(configuration, size): (usize, &f64)| Cluster {
             configuration,
@@ -94,10 +106,10 @@ mod tests {
 
     #[test]
     fn movements_are_unlike_where_their_sizes_differ_by_more_than_chance() {
-        let common = [(0, 1.0)];
-        assert_eq!(unlike(&told(&[1.1, 0.8, 1.2, 0.9, 1.0, 1.0]), &common), 0.0);
+        let of = |sizes| unlike(&told(&trials(sizes), &[(0, 1.0)]));
+        assert_eq!(of(&[1.1, 0.8, 1.2, 0.9, 1.0, 1.0]), 0.0);
         // One movement makes it all: squared distances of 5 · 25 + 625, less the 20.5 that chance makes of five.
-        let one = unlike(&told(&[6.0, 0.0, 0.0, 0.0, 0.0, 0.0]), &common);
+        let one = of(&[6.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert!((one - (750.0 - 20.5)).abs() < 0.3, "{one}");
     }
 
@@ -105,10 +117,11 @@ mod tests {
     /// six that say what the noise says.
     #[test]
     fn six_trials_as_the_noise_says_stand_beside_what_repeats_scatter() {
-        let mut trials = told(&[0.0, 2.0]);
-        trials[1].configuration = 0;
-        let found = spread(&trials, &[(0, 1.0)]);
+        let of = |trials: &[Cluster]| spread(&told(trials, &[(0, 1.0)]));
+        let mut repeats = trials(&[0.0, 2.0]);
+        repeats[1].configuration = 0;
+        let found = of(&repeats);
         assert!((found - (6.0 + 50.0) / 7.0).abs() < 1e-12, "{found}");
-        assert_eq!(spread(&told(&[0.0, 2.0]), &[(0, 1.0)]), 1.0);
+        assert_eq!(of(&trials(&[0.0, 2.0])), 1.0);
     }
 }

@@ -322,14 +322,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let before = converged.plainer.len();
             let asking = (library, score_test);
             let (best, reserves) = contenders(&choices, library);
-            for choice in best {
-                self.converge(choice, state, asking, &mut converged);
-            }
+            self.converge(best, state, asking, &mut converged);
             for choice in reserves {
                 if !converged.tried.is_empty() {
                     break;
                 }
-                self.converge(choice, state, asking, &mut converged);
+                self.converge(vec![choice], state, asking, &mut converged);
             }
             if converged.plainer.len() == before {
                 break;
@@ -350,38 +348,43 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
-    /// Converges a choice by simulation, unless it has been.
+    /// Converges choices by simulation, each unless it has been.
     fn converge(
         &self,
-        choice: Choice,
+        mut choices: Vec<Choice>,
         state: &SearchState<'a, N>,
         (library, score_test): (&Library, &ScoreTest),
         converged: &mut Converged<N>,
     ) {
-        if converged.met.contains(&choice.members) {
-            return;
-        }
+        choices.retain(|choice| !converged.met.contains(&choice.members));
         let question = |&m: &usize| {
             let mut candidate = library.candidates[m].clone();
             (candidate.price, candidate.spread) = (score_test.price[m], score_test.spread[m]);
             candidate
         };
-        let asked: Vec<Candidate> = choice.members.iter().map(question).collect();
         let SearchState { current, point, .. } = state;
-        let fitted = self.attempt(current, (&asked, &choice.coefficients), point);
-        converged.met.push(choice.members);
-        let Some(fitted) = fitted else {
-            return;
-        };
-        let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
-        let gain = current.cost - fitted.cost;
-        let worth = gain / score_test.scale - price;
-        let simple = worth - self.price_of_shapes(&asked);
-        converged.tried.push((asked, gain));
-        if fitted.has_plainer() {
-            converged.plainer.extend(fitted.plainer());
-        } else if worth > 0.0 {
-            converged.worthy.push((simple, fitted));
+        let fitted = self.parallel(choices.len(), |i| {
+            let Choice {
+                members,
+                coefficients,
+                ..
+            } = &choices[i];
+            let asked: Vec<Candidate> = members.iter().map(question).collect();
+            let fitted = self.attempt(current, (&asked, coefficients), point)?;
+            Some((asked, fitted))
+        });
+        converged.met.extend(choices.into_iter().map(|c| c.members));
+        for (asked, fitted) in fitted.into_iter().flatten() {
+            let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
+            let gain = current.cost - fitted.cost;
+            let worth = gain / score_test.scale - price;
+            let simple = worth - self.price_of_shapes(&asked);
+            converged.tried.push((asked, gain));
+            if fitted.has_plainer() {
+                converged.plainer.extend(fitted.plainer());
+            } else if worth > 0.0 {
+                converged.worthy.push((simple, fitted));
+            }
         }
     }
 
@@ -500,6 +503,7 @@ mod tests {
                 .map(|&kind| Candidate::about(Effect::new(kind, 0)))
                 .collect(),
             responses: Vec::new(),
+            columns: std::sync::OnceLock::new(),
         };
         let choice = |members: Vec<usize>, worth| Choice {
             coefficients: vec![vec![1.0]; members.len()],

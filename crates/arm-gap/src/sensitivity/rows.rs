@@ -35,6 +35,10 @@ struct Class {
     products: Matrix,
 }
 
+/// Whitened responses with their products, class by class.
+#[derive(Default)]
+pub struct Columns(Vec<(Vec<Vec<f64>>, Matrix)>);
+
 /// Whitened columns of the fitted trials.
 #[derive(Clone, Default)]
 pub struct Rows {
@@ -75,15 +79,10 @@ impl Rows {
                 }
             }
         }
-        let whitened = prepared.parallel(classes.len(), |i| {
-            let class = &classes[i];
-            let all = own.iter().chain(responses);
-            let columns: Vec<Vec<f64>> = all.map(|r| class.whitened(prepared, r)).collect();
-            let products = products(&columns, &columns, true);
-            (columns, products)
-        });
-        for (class, (columns, products)) in classes.iter_mut().zip(whitened) {
-            (class.columns, class.products) = (columns, products);
+        let all: Vec<&Response> = own.iter().chain(responses).collect();
+        let Columns(whitened) = columns(&classes, prepared, &all);
+        for (class, whitened) in classes.iter_mut().zip(whitened) {
+            (class.columns, class.products) = whitened;
         }
         let sd = |c: crate::measurement_model::hypothesis::Coordinate| {
             c.prior.map_or(f64::INFINITY, |(_, sd)| sd)
@@ -113,6 +112,15 @@ impl Rows {
         }
     }
 
+    /// Whitens responses to further unknowns, for [`Rows::clusters_beside`].
+    pub fn columns<const N: usize>(
+        &self,
+        prepared: &PreparedSession<N>,
+        responses: &[&Response],
+    ) -> Columns {
+        columns(&self.classes, prepared, responses)
+    }
+
     /// Condenses the fitted trials to normal equations, in their order.
     ///
     /// * `extra` - responses to further unknowns, behind those that are always refitted
@@ -123,10 +131,23 @@ impl Rows {
         extra: &[&Response],
         residuals: &[Channels],
     ) -> Vec<Cluster> {
+        self.clusters_beside(prepared, (extra, &Columns::default()), residuals)
+    }
+
+    /// The same with columns that are known behind them.
+    pub fn clusters_beside<const N: usize>(
+        &self,
+        prepared: &PreparedSession<N>,
+        (extra, known): (&[&Response], &Columns),
+        residuals: &[Channels],
+    ) -> Vec<Cluster> {
         let condensed = prepared.parallel(self.classes.len(), |i| {
             let class = &self.classes[i];
-            let more: Vec<Vec<f64>> = extra.iter().map(|r| class.whitened(prepared, r)).collect();
-            let gram = bordered(class, &more);
+            let own: Vec<Vec<f64>> = extra.iter().map(|r| class.whitened(prepared, r)).collect();
+            let none = (Vec::new(), Matrix::zeros(0, 0));
+            let known = known.0.get(i).unwrap_or(&none);
+            let gram = bordered(class, &own, known);
+            let more: Vec<&Vec<f64>> = own.iter().chain(&known.0).collect();
             let residuals: Vec<Vec<f64>> = class
                 .members
                 .iter()
@@ -165,7 +186,7 @@ impl Rows {
     fn condense(
         &self,
         class: &Class,
-        (first, more): (&[Vec<f64>], &[Vec<f64>]),
+        (first, more): (&[Vec<f64>], &[&Vec<f64>]),
         mut gram: Matrix,
         residuals: &[Vec<f64>],
     ) -> Vec<Cluster> {
@@ -186,7 +207,7 @@ impl Rows {
         residuals
             .iter()
             .map(|residual| {
-                let all = first.iter().chain(more);
+                let all = first.iter().chain(more.iter().copied());
                 let score: Vec<f64> = all.map(|c| dot(c, residual)).collect();
                 let (own, common) = score.split_at(k);
                 let mut common = common.to_vec();
@@ -249,16 +270,39 @@ impl Class {
     }
 }
 
-/// Products of all columns of a class and further ones.
-fn bordered(class: &Class, more: &[Vec<f64>]) -> Matrix {
+/// Products of all columns of a class, further ones, and some whose own products are known.
+fn bordered(class: &Class, more: &[Vec<f64>], known: &(Vec<Vec<f64>>, Matrix)) -> Matrix {
     let (n, m) = (class.columns.len(), more.len());
-    let mut gram = Matrix::zeros(n + m, n + m);
-    let mixed = products(&class.columns, more, false);
+    let all = n + m + known.0.len();
+    let mut gram = Matrix::zeros(all, all);
     gram.set_block((0, 0), &class.products);
-    gram.set_block((0, n), &mixed);
-    gram.set_block((n, 0), &mixed.transpose());
     gram.set_block((n, n), &products(more, more, true));
+    gram.set_block((n + m, n + m), &known.1);
+    let mixed = [
+        (0, n, products(&class.columns, more, false)),
+        (0, n + m, products(&class.columns, &known.0, false)),
+        (n, n + m, products(more, &known.0, false)),
+    ];
+    for (row, column, block) in &mixed {
+        gram.set_block((*row, *column), block);
+        gram.set_block((*column, *row), &block.transpose());
+    }
     gram
+}
+
+fn columns<const N: usize>(
+    classes: &[Class],
+    prepared: &PreparedSession<N>,
+    responses: &[&Response],
+) -> Columns {
+    let whitened = prepared.parallel(classes.len(), |i| {
+        let class = &classes[i];
+        let each = responses.iter().map(|r| class.whitened(prepared, r));
+        let columns: Vec<Vec<f64>> = each.collect();
+        let products = products(&columns, &columns, true);
+        (columns, products)
+    });
+    Columns(whitened)
 }
 
 fn products(a: &[Vec<f64>], b: &[Vec<f64>], symmetric: bool) -> Matrix {
