@@ -34,7 +34,7 @@ impl<const N: usize> Linear<'_, N> {
         let (near, friction) = self.session.at_start(changed, course)?;
         let answer = self.follow(&plant, &hands, (&near, &friction));
         let answer = answer.ok_or(ASTRAY)?;
-        let mut sensed = self.sensed(&plant, Some(&answer), None);
+        let mut sensed = self.sensed((&self.own, &plant), Some(&answer), None);
         // A low-pass ends where the trial ends.
         let count = course.raw[0].len();
         sensed

@@ -51,9 +51,9 @@ impl<const N: usize> Linear<'_, N> {
     pub fn origin(&self, hypothesis: &Hypothesis<N>) -> Result<Origin<N>, SimulationError> {
         let plant = Plant::new(self.session, hypothesis, &self.course.rhythms)?;
         let start = self.session.at_start(hypothesis, &self.course)?;
-        let shown = self.sensed(&plant, None, None);
-        let origin = Origin::of(plant, start);
-        Ok(Origin { shown, ..origin })
+        let mut origin = Origin::of(plant, start);
+        origin.shown = self.sensed((&origin, &origin.plant), None, None);
+        Ok(origin)
     }
 
     /// What the sensors would read more, for one unit of a change of the hypothesis of the run.
@@ -97,7 +97,7 @@ impl<const N: usize> Linear<'_, N> {
             false => nowhere,
         };
         let mut out = if asked.sensing && start == nowhere {
-            self.sensed(&plant, None, None)
+            self.sensed((origin, &plant), None, None)
         } else {
             let own;
             let hands = if asked.moves_handle {
@@ -108,7 +108,7 @@ impl<const N: usize> Linear<'_, N> {
             };
             let answers = self.solve((origin, &plant), hands, start);
             let known = self.unchanged((origin, &plant), &answers);
-            self.sensed(&plant, Some(&answers), known)
+            self.sensed((origin, &plant), Some(&answers), known)
         };
         for (channel, base) in out.iter_mut().zip(&origin.shown) {
             for (value, base) in channel.iter_mut().zip(base) {

@@ -6,7 +6,7 @@ use arm_core::effect::{Effect, MAX_STATES, States, advance_states, any_state};
 use arm_core::{Joints, Plane, Reading};
 use arm_sim::{SimulationError, Slopes, cubic_weights};
 use nalgebra::SMatrix;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
@@ -63,8 +63,6 @@ pub struct Linear<'a, const N: usize> {
     records: Vec<State<N>>,
     /// Force on the arm at every record.
     recorded_force: Vec<Plane<f64>>,
-    /// The same as the sensor of the run shows it at the samples of the trial, without its errors.
-    delayed_force: Vec<Plane<f64>>,
     /// The run at every step.
     pub(super) states: Vec<State<N>>,
     pub(super) hands: Vec<Hand>,
@@ -91,20 +89,16 @@ impl<'a, const N: usize> Linear<'a, N> {
         hypothesis: &Hypothesis<N>,
         course: &Arc<Course<N>>,
     ) -> Result<Self, SimulationError> {
-        let mut plant = Plant::new(session, hypothesis, &course.rhythms)?;
-        // Effects that are asked later may feel them.
-        plant.feels_force = true;
+        let plant = Plant::new(session, hypothesis, &course.rhythms)?;
         let grid = Grid::of(course.rate);
         let run = session.run_finely(hypothesis, course, grid.parts)?;
         let recording = run.recording();
         let interval = 1.0 / course.rate / grid.parts as f64;
         let at = |v: &[f64], i: usize| Joints::from_column_slice(&v[i * N..(i + 1) * N]);
         let records: Vec<State<N>> = (0..recording.len())
-            .map(|i| State {
-                time: i as f64 * interval,
-                q: at(&recording.q, i),
-                qd: at(&recording.qd, i),
-                qdd: at(&recording.qdd, i),
+            .map(|i| {
+                let moving = [&recording.q, &recording.qd, &recording.qdd].map(|v| at(v, i));
+                State::new(i as f64 * interval, moving)
             })
             .collect();
         let start = session.at_start(hypothesis, course)?;
@@ -115,7 +109,6 @@ impl<'a, const N: usize> Linear<'a, N> {
             step: interval * grid.stride as f64,
             own: Origin::of(plant, start),
             recorded_force: Vec::with_capacity(records.len()),
-            delayed_force: Vec::new(),
             states: records.iter().step_by(grid.stride).copied().collect(),
             records,
             hands: Vec::new(),
@@ -133,9 +126,12 @@ impl<'a, const N: usize> Linear<'a, N> {
             linear.recorded_force.push(force);
         }
         linear.hands = every.into_iter().step_by(grid.stride).collect();
-        linear.delayed_force = linear.force_after(plant.setup.force_delay);
         let memories = linear.memories(&plant.resisting);
-        linear.balances = linear.balances_of(plant, &memories);
+        let feels_force = plant.feels_force;
+        // Effects that are asked later may feel them.
+        linear.own.plant.feels_force = true;
+        linear.balances = linear.balances_of(&linear.own.plant, &memories);
+        linear.own.plant.feels_force = feels_force;
         for i in 0..linear.states.len() {
             linear.differentiate(i, memories.get(i).map_or(&[], Vec::as_slice));
         }
@@ -145,7 +141,7 @@ impl<'a, const N: usize> Linear<'a, N> {
                 &held_at_start(&linear.balances[0].friction),
             )
         });
-        linear.own.shown = linear.sensed(&linear.own.plant, None, None);
+        linear.own.shown = linear.sensed((&linear.own, &linear.own.plant), None, None);
         Ok(linear)
     }
 
@@ -204,8 +200,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         let left_over = |there: &Balance<N>| there.torque + there.friction.component_mul(&way);
         let at = [state.q, state.qd, state.qdd];
         let slopes = Slopes::around(at, &left_over(middle), |q, qd, qdd| {
-            let (time, q, qd, qdd) = (state.time, *q, *qd, *qdd);
-            let there = State { time, q, qd, qdd };
+            let there = state.beside([*q, *qd, *qdd]);
             let there = balance(&self.own.plant, &there, hand, memory);
             (left_over(&there), there.force)
         });
@@ -246,10 +241,11 @@ impl<'a, const N: usize> Linear<'a, N> {
 
     /// What the sensors read of the run with changes on it, at the samples of the trial.
     ///
+    /// * `plant` - with sensors that are, all or but one, those of `origin`
     /// * `known` - what they read at its first samples
     pub(super) fn sensed(
         &self,
-        plant: &Plant<N>,
+        (origin, plant): (&Origin<N>, &Plant<N>),
         changes: Option<&[(Joints<f64, N>, Plane<f64>)]>,
         known: Option<Channels>,
     ) -> Channels {
@@ -257,6 +253,9 @@ impl<'a, const N: usize> Linear<'a, N> {
         let count = self.course.raw[0].len();
         let mut channels = known.unwrap_or_else(|| vec![Vec::with_capacity(count); N + 2]);
         let first = channels[0].len();
+        for channel in &mut channels {
+            channel.reserve(count - first);
+        }
         let last = self.records.len() - 1;
         // Between two steps changes go straight.
         let change = |record: f64| {
@@ -271,14 +270,13 @@ impl<'a, const N: usize> Linear<'a, N> {
                 [0, 1].map(|c| force[c] + share * (next_force[c] - force[c])),
             ))
         };
-        let own;
-        let forces = if plant.setup.force_delay == self.own.plant.setup.force_delay {
-            &self.delayed_force
-        } else {
-            own = self.force_after(plant.setup.force_delay);
-            &own
-        };
-        let delay = plant.setup.force_delay / self.step * stride as f64;
+        let delay = plant.setup.force_delay;
+        let fresh = OnceLock::new();
+        let is_as_late = |o: &&Origin<N>| o.plant.setup.force_delay == delay;
+        let same = [origin, &self.own].into_iter().find(is_as_late);
+        let forces = same.map_or(&fresh, |o| &o.delayed_force);
+        let forces = forces.get_or_init(|| self.force_after(delay));
+        let delay = delay / self.step * stride as f64;
         for sample in first..count {
             let i = (sample * parts).min(last);
             let more = change(i as f64).map_or_else(Joints::zeros, |c| c.0);

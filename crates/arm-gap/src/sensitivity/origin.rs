@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use arm_core::Joints;
+use arm_core::{Joints, Plane};
 
 use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::plant::{Balance, Plant};
@@ -14,6 +14,8 @@ pub struct Origin<const N: usize> {
     pub(super) start: (Joints<f64, N>, Joints<f64, N>),
     /// What its sensors read of the motion of the run.
     pub(super) shown: Channels,
+    /// Force on the arm as its sensor shows it at the samples of the trial, without its errors, where that was asked.
+    pub(super) delayed_force: OnceLock<Vec<Plane<f64>>>,
     /// What it says of the motion of the run, where that was asked.
     pub(super) balances: OnceLock<Vec<Balance<N>>>,
 }
@@ -24,6 +26,7 @@ impl<const N: usize> Origin<N> {
             plant,
             start,
             shown: Channels::new(),
+            delayed_force: OnceLock::new(),
             balances: OnceLock::new(),
         }
     }

@@ -62,13 +62,13 @@ impl<const N: usize> Plant<N> {
         }
     }
 
-    /// The chain as seen from its base, and how far and how fast the base has moved, with the first joint and by itself.
+    /// The chain as seen from its base where that is another one, and how far and how fast the base has moved, with the first joint and by itself.
     ///
     /// A base that is accelerated is one that stands in another gravity.
-    fn based(&self, state: &State<N>, base: Base) -> (Chain<f64, N>, [Plane<f64>; 2]) {
+    fn based(&self, state: &State<N>, base: Base) -> (Option<Chain<f64, N>>, [Plane<f64>; 2]) {
         let u = self.setup.base_motion;
         if u == [0.0; 2] && self.setup.heave.is_still() && base.is_none() {
-            return (self.chain, [[0.0; 2]; 2]);
+            return (None, [[0.0; 2]; 2]);
         }
         let angle = state.q[0] - self.setup.base_rest;
         let [mut at, mut rate, mut acceleration] = self.setup.heave.at(state.time);
@@ -78,13 +78,8 @@ impl<const N: usize> Plant<N> {
             rate[axis] += u[axis] * state.qd[0] + faster[axis];
             acceleration[axis] += u[axis] * state.qdd[0] + growing[axis];
         }
-        let mut setup = self.setup;
-        for axis in 0..2 {
-            setup.gravity[axis] -= acceleration[axis];
-        }
-        // The segments were accepted before, and gravity may be any.
-        let chain = setup.chain().unwrap_or(self.chain);
-        (chain, [at, rate])
+        let gravity = [0, 1].map(|axis| self.setup.gravity[axis] - acceleration[axis]);
+        (Some(self.chain.with_gravity(gravity)), [at, rate])
     }
 
     /// Most that the set-valued dry friction of each joint can resist with \[N m\].
@@ -129,17 +124,33 @@ pub(super) struct State<const N: usize> {
     pub q: Joints<f64, N>,
     pub qd: Joints<f64, N>,
     pub qdd: Joints<f64, N>,
+    /// At these angles: whatever is asked of a run is asked there.
+    pose: Pose<f64, N>,
 }
 
 impl<const N: usize> State<N> {
+    pub fn new(time: f64, [q, qd, qdd]: [Joints<f64, N>; 3]) -> Self {
+        let pose = Pose::new(&q);
+        Self {
+            time,
+            q,
+            qd,
+            qdd,
+            pose,
+        }
+    }
+
+    /// Another motion at the same instant.
+    pub fn beside(&self, [q, qd, qdd]: [Joints<f64, N>; 3]) -> Self {
+        match q == self.q {
+            true => Self { qd, qdd, ..*self },
+            false => Self::new(self.time, [q, qd, qdd]),
+        }
+    }
+
     /// The state with changes on it.
     pub fn moved(&self, q: &Joints<f64, N>, qd: &Joints<f64, N>, qdd: &Joints<f64, N>) -> Self {
-        Self {
-            time: self.time,
-            q: self.q + q,
-            qd: self.qd + qd,
-            qdd: self.qdd + qdd,
-        }
+        self.beside([self.q + q, self.qd + qd, self.qdd + qdd])
     }
 
     /// The motion as the states of effects see it.
@@ -171,24 +182,25 @@ pub(super) fn balance<const N: usize>(
     hand: Hand,
     memory: &[States<f64>],
 ) -> Balance<N> {
-    let pose = Pose::new(&state.q);
+    let pose = &state.pose;
     let [at, rate] = plant.handle(state.time, hand);
-    let (chain, [shift, drift]) = plant.based(state, hand.base);
-    let place = tip(&chain, &pose);
-    let moving = jacobian(&chain, &pose) * state.qd;
+    let (other, [shift, drift]) = plant.based(state, hand.base);
+    let chain = other.as_ref().unwrap_or(&plant.chain);
+    let place = tip(chain, pose);
+    let moving = jacobian(chain, pose) * state.qd;
     let placement = Placement::of(&plant.setup);
-    let beside = placement.map_or([0.0; 2], |p| p.arm(&pose));
-    let turning = placement.map_or([0.0; 2], |p| p.velocity(&pose, &state.qd));
+    let beside = placement.map_or([0.0; 2], |p| p.arm(pose));
+    let turning = placement.map_or([0.0; 2], |p| p.velocity(pose, &state.qd));
     let force = plant.contact.force_on_arm(
         [0, 1].map(|a| at[a] - place[a] - beside[a] - shift[a]),
         [0, 1].map(|a| rate[a] - moving[a] - turning[a] - drift[a]),
     );
-    let moment = placement.map_or(0.0, |p| p.moment(&pose, force));
+    let moment = placement.map_or(0.0, |p| p.moment(pose, force));
     let mut motion = state.motion();
-    let mut torque = inverse_dynamics(&chain, &pose, &state.qd, &state.qdd)
-        - static_torque(&chain, &pose, force, moment);
+    let mut torque = inverse_dynamics(chain, pose, &state.qd, &state.qdd)
+        - static_torque(chain, pose, force, moment);
     if plant.feels_force {
-        let through = joint_force(&chain, &pose, (&state.qd, &state.qdd), force);
+        let through = joint_force(chain, pose, (&state.qd, &state.qdd), force);
         motion = motion.with_joint_force(&through);
         // The guide of a moving base carries the force through the first joint.
         let u = plant.setup.base_motion;
