@@ -8,8 +8,9 @@ use crate::data::repeats::groups;
 use crate::data::session::Session;
 use crate::data::valid_segments::{ObservableForce, ValidSegments};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::measurement_model::prediction::Course;
+use crate::measurement_model::prediction::{Channels, Course};
 use crate::sensitivity::linearized_run::Linear;
+use crate::sensitivity::response::Response;
 use crate::threads;
 
 /// How long a disturbance is felt before and after, the low-pass and the error of its timing included \[s\].
@@ -56,11 +57,19 @@ pub struct PreparedSession<'a, const N: usize> {
     /// Threads.
     pub threads: usize,
     /// The runs of the hypotheses that were simulated last: a search comes back to what it has tried.
-    pub(crate) simulated: Arc<Mutex<Vec<SimulatedRuns<'a, N>>>>,
+    pub(crate) simulated: Arc<Mutex<Vec<Arc<SimulatedRuns<'a, N>>>>>,
 }
 
-/// A hypothesis, and its run on the reference of each group.
-pub(crate) type SimulatedRuns<'a, const N: usize> = (Hypothesis<N>, Arc<Vec<Linear<'a, N>>>);
+/// A hypothesis that was simulated, and what was told from its runs: a search asks the same again when noise or samples have changed.
+pub(crate) struct SimulatedRuns<'a, const N: usize> {
+    pub hypothesis: Hypothesis<N>,
+    /// On the reference of each group.
+    pub lines: Arc<Vec<Linear<'a, N>>>,
+    /// What the sensors would read on trials, in the common band.
+    pub shown: Mutex<Vec<(Arc<Course<N>>, Channels)>>,
+    /// Responses to numbers of the hypothesis.
+    pub responses: Mutex<Vec<(Coordinate, Response)>>,
+}
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Makes a session ready; the noise is read off the repeats of the fit trials against the model as given.

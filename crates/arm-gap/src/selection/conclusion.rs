@@ -138,8 +138,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         apart: &mut SetApart<N>,
     ) -> Result<[Vec<Hypothesis<N>>; 2], GapError> {
         let rhythms = rhythms_of(&apart.trial_specific);
-        for fitted in [&mut *calibrated, &mut *amended] {
-            if let Some(hypothesis) = self.tuned(&fitted.hypothesis, &rhythms) {
+        let both = [&calibrated.hypothesis, &amended.hypothesis];
+        let tuned = self.parallel(both.len(), |i| self.tuned(both[i], &rhythms));
+        for (fitted, tuned) in std::iter::zip([&mut *calibrated, &mut *amended], tuned) {
+            if let Some(hypothesis) = tuned {
                 fitted.hypothesis = hypothesis;
             }
         }

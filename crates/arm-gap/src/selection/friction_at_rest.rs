@@ -73,12 +73,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn smoothed(&self, fitted: &Fitted<N>, laws: &[Target]) -> Fitted<N> {
         // What cannot be simulated is not chosen.
         let simulated = |hypothesis: Hypothesis<N>| {
-            let point = self.linearize(&hypothesis).ok()?;
             let asked = fitted.asked.clone();
-            match fitted.leaves_much() {
-                true => self.fit(&point, hypothesis, asked).ok(),
-                false => self.state(&point, hypothesis, asked).ok(),
+            if fitted.leaves_much() {
+                let point = self.linearize(&hypothesis).ok()?;
+                return self.fit(&point, hypothesis, asked).ok();
             }
+            let point = self.simulate_alone(&hypothesis).ok()?;
+            self.state(&point, hypothesis, asked).ok()
         };
         let mut best = simulated(fitted.hypothesis.clone()).unwrap_or_else(|| fitted.clone());
         for &law in laws {

@@ -4,12 +4,12 @@
 //! One trial of each movement is simulated. Repeats follow it along their own handle's path, other hypotheses follow it
 //! as changes; both cost a hundredth of a simulation.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use arm_sim::SimulationError;
 
 use crate::GapError;
-use crate::data::prepared_session::PreparedSession;
+use crate::data::prepared_session::{PreparedSession, SimulatedRuns};
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
@@ -26,6 +26,8 @@ pub struct LinearizationPoint<'a, const N: usize> {
     pub hypothesis: Hypothesis<N>,
     /// The runs along which led arms are followed, by group; nothing where torques are compared.
     pub lines: Arc<Vec<Linear<'a, N>>>,
+    /// What was told from these runs; nothing where torques are compared.
+    runs: Option<Arc<SimulatedRuns<'a, N>>>,
     /// What the sensors would read of each group's reference, in the common band.
     shown: Vec<Channels>,
     /// Measured less predicted channels of the fitted trials.
@@ -49,6 +51,7 @@ impl<const N: usize> LinearizationPoint<'_, N> {
         Self {
             hypothesis: self.hypothesis.clone(),
             lines: Arc::clone(&self.lines),
+            runs: self.runs.clone(),
             shown: self.shown.clone(),
             residuals: self.residuals.clone(),
             coordinates,
@@ -67,29 +70,49 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         hypothesis: &Hypothesis<N>,
     ) -> Result<LinearizationPoint<'a, N>, GapError> {
-        let failed = |trial: usize| move |source| GapError::Simulation { trial, source };
-        let lines = match self.session.comparison {
-            ComparisonMode::Torque => Arc::default(),
-            ComparisonMode::Led => self.simulated(hypothesis)?,
+        self.anchored(hypothesis, self.nuisances())
+    }
+
+    /// The same without rows of the nuisances, which the cost of the hypothesis itself does not ask for.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::linearize`].
+    pub(crate) fn simulate_alone(
+        &self,
+        hypothesis: &Hypothesis<N>,
+    ) -> Result<LinearizationPoint<'a, N>, GapError> {
+        let alone = self.anchored(hypothesis, Vec::new())?;
+        Ok(LinearizationPoint {
+            coordinates: self.nuisances(),
+            ..alone
+        })
+    }
+
+    fn anchored(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        coordinates: Vec<Coordinate>,
+    ) -> Result<LinearizationPoint<'a, N>, GapError> {
+        let runs = match self.session.comparison {
+            ComparisonMode::Torque => None,
+            ComparisonMode::Led => Some(self.simulated(hypothesis)?),
         };
+        let lines = runs.as_ref().map(|runs| Arc::clone(&runs.lines));
         let mut point = LinearizationPoint {
             hypothesis: hypothesis.clone(),
-            lines,
+            lines: lines.unwrap_or_default(),
+            runs,
             shown: Vec::new(),
             residuals: Vec::new(),
-            coordinates: self.nuisances(),
+            coordinates,
             own: Vec::new(),
             rows: Rows::default(),
         };
-        point.shown = self.shown(&point, hypothesis)?;
-        let one = |i: usize| {
-            let trial = self.fitted[i];
-            let course = &self.courses[trial];
-            let shown = self.follow(&point, hypothesis, (self.group_of[trial], course));
-            Ok(difference(&course.seen, &shown.map_err(failed(trial))?))
-        };
-        let residuals = self.parallel(self.fitted.len(), one);
-        point.residuals = residuals.into_iter().collect::<Result<_, GapError>>()?;
+        point.shown = self.shown_on(&point, &self.references)?;
+        let shown = self.shown_on(&point, &self.fitted)?;
+        let residual =
+            |(&trial, shown): (&usize, &Channels)| difference(&self.courses[trial].seen, shown);
+        point.residuals = std::iter::zip(&self.fitted, &shown).map(residual).collect();
         let mut all = point.coordinates.clone();
         all.extend(self.session.by_trial());
         let mut responses = self.responses_to(&point, &all)?;
@@ -98,23 +121,44 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(point)
     }
 
+    /// What the sensors would read on trials under the anchor's hypothesis, in the common band.
+    fn shown_on(
+        &self,
+        point: &LinearizationPoint<N>,
+        trials: &[usize],
+    ) -> Result<Vec<Channels>, GapError> {
+        let one = |i: usize| {
+            let (trial, course) = (trials[i], &self.courses[trials[i]]);
+            let known = point.runs.as_ref().map(|runs| locked(&runs.shown));
+            let is_it = |other: &&(Arc<Course<N>>, Channels)| Arc::ptr_eq(&other.0, course);
+            if let Some((_, shown)) = known.iter().flat_map(|all| all.iter()).find(is_it) {
+                return Ok(shown.clone());
+            }
+            drop(known);
+            let shown = self
+                .follow(point, &point.hypothesis, (self.group_of[trial], course))
+                .map_err(|source| GapError::Simulation { trial, source })?;
+            if let Some(runs) = &point.runs {
+                locked(&runs.shown).push((Arc::clone(course), shown.clone()));
+            }
+            Ok(shown)
+        };
+        let all = self.parallel(trials.len(), one);
+        all.into_iter().collect()
+    }
+
     /// The run of a hypothesis on the reference of each group.
-    fn simulated(&self, hypothesis: &Hypothesis<N>) -> Result<Arc<Vec<Linear<'a, N>>>, GapError> {
+    fn simulated(&self, hypothesis: &Hypothesis<N>) -> Result<Arc<SimulatedRuns<'a, N>>, GapError> {
         /// Hypotheses whose runs are kept.
         const KEPT: usize = 6;
-        let kept = || {
-            self.simulated
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-        };
         let has_rhythms =
             |line: &Linear<N>, trial: usize| line.course.rhythms == self.courses[trial].rhythms;
-        let is_same = |(other, lines): &&(Hypothesis<N>, Arc<Vec<Linear<'a, N>>>)| {
-            let mut runs = std::iter::zip(lines.iter(), &self.references);
-            other == hypothesis && runs.all(|(line, &trial)| has_rhythms(line, trial))
+        let is_same = |other: &&Arc<SimulatedRuns<'a, N>>| {
+            let mut lines = std::iter::zip(other.lines.iter(), &self.references);
+            other.hypothesis == *hypothesis && lines.all(|(line, &trial)| has_rhythms(line, trial))
         };
-        if let Some((_, lines)) = kept().iter().find(is_same) {
-            return Ok(Arc::clone(lines));
+        if let Some(known) = locked(&self.simulated).iter().find(is_same) {
+            return Ok(Arc::clone(known));
         }
         let one = |group: usize| {
             let trial = self.references[group];
@@ -122,11 +166,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .map_err(|source| GapError::Simulation { trial, source })
         };
         let lines = self.parallel(self.references.len(), one);
-        let lines = Arc::new(lines.into_iter().collect::<Result<Vec<_>, _>>()?);
-        let mut kept = kept();
+        let lines = lines.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let fresh = Arc::new(SimulatedRuns {
+            hypothesis: hypothesis.clone(),
+            lines: Arc::new(lines),
+            shown: Mutex::default(),
+            responses: Mutex::default(),
+        });
+        let mut kept = locked(&self.simulated);
         kept.truncate(KEPT - 1);
-        kept.insert(0, (hypothesis.clone(), Arc::clone(&lines)));
-        Ok(lines)
+        kept.insert(0, Arc::clone(&fresh));
+        Ok(fresh)
     }
 
     /// What the sensors would read on a trial of a group, in the common band.
@@ -255,11 +305,22 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         point: &LinearizationPoint<N>,
         coordinates: &[Coordinate],
     ) -> Result<Vec<Response>, GapError> {
-        let changes: Vec<_> = coordinates
-            .iter()
-            .map(|c| self.nudged(&point.hypothesis, c))
-            .collect();
-        self.responses(point, &changes)
+        let told = |coordinates: &[Coordinate]| {
+            let each = coordinates.iter();
+            let changes: Vec<_> = each.map(|c| self.nudged(&point.hypothesis, c)).collect();
+            self.responses(point, &changes)
+        };
+        let Some(runs) = &point.runs else {
+            return told(coordinates);
+        };
+        let mut missing = coordinates.to_vec();
+        let is_known = |c: &Coordinate| locked(&runs.responses).iter().any(|(k, _)| k == c);
+        missing.retain(|c| !is_known(c));
+        let fresh = told(&missing)?;
+        let mut known = locked(&runs.responses);
+        known.extend(std::iter::zip(missing, fresh));
+        let of = |c: &Coordinate| known.iter().find(|(k, _)| k == c).map(|(_, r)| r.clone());
+        Ok(coordinates.iter().filter_map(of).collect())
     }
 
     /// Responses to numbers of a hypothesis away from the anchor.
@@ -324,6 +385,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let all = self.parallel(self.fitted.len(), one);
         all.into_iter().collect()
     }
+}
+
+fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The difference of channels for one unit of a change.

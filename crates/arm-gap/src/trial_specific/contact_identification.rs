@@ -64,8 +64,9 @@ impl<const N: usize> PreparedSession<'_, N> {
             swings: rhythms.iter().map(swing).collect(),
             sizes: vec![1.0; self.session.channels()],
         };
-        heard.sizes = sizes(&self.above(&heard, start)?);
-        let before = self.left_ringing(&heard, start)?;
+        let above = self.above(&heard, start)?;
+        heard.sizes = sizes(&above);
+        let before = heard.row(&above);
         let given = Hypothesis {
             contact: self.session.given().contact,
             ..start.clone()
@@ -144,15 +145,16 @@ impl<const N: usize> PreparedSession<'_, N> {
         &self,
         at: &Tuned<N>,
         coordinates: &[Coordinate],
-        left: &dyn Fn(&Hypothesis<N>) -> Option<Left>,
+        left: &(dyn Fn(&Hypothesis<N>) -> Option<Left> + Sync),
     ) -> Option<Vec<f64>> {
-        let slope = |c: &Coordinate| {
-            let change = self.nudged(&at.hypothesis, c);
+        let slope = |i: usize| {
+            let change = self.nudged(&at.hypothesis, &coordinates[i]);
             let moved = left(&change.changed)?;
             let slope = std::iter::zip(&at.left, moved).map(|(l, m)| (l - m) / change.size);
-            Some(slope.collect())
+            Some(slope.collect::<Left>())
         };
-        let slopes: Vec<Left> = coordinates.iter().map(slope).collect::<Option<_>>()?;
+        let slopes = self.parallel(coordinates.len(), slope);
+        let slopes: Vec<Left> = slopes.into_iter().collect::<Option<_>>()?;
         let cluster = Cluster {
             configuration: 0,
             gram: Arc::new(Matrix::from_fn(slopes.len(), slopes.len(), |a, b| {
@@ -210,12 +212,18 @@ impl<const N: usize> PreparedSession<'_, N> {
 
     /// The same in one row, each channel in its size.
     fn left_ringing(&self, heard: &Heard, hypothesis: &Hypothesis<N>) -> Option<Left> {
-        let trials = self.above(heard, hypothesis)?;
+        Some(heard.row(&self.above(heard, hypothesis)?))
+    }
+}
+
+impl Heard {
+    /// What is left of every trial in one row, each channel in its size.
+    fn row(&self, trials: &[Channels]) -> Left {
         let each = trials
             .iter()
-            .flat_map(|t| std::iter::zip(t, &heard.sizes))
+            .flat_map(|t| std::iter::zip(t, &self.sizes))
             .flat_map(|(channel, size)| channel.iter().map(move |v| v / size));
-        Some(each.collect())
+        each.collect()
     }
 }
 
