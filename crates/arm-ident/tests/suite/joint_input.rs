@@ -59,7 +59,7 @@ fn test_trials_change_no_bit_of_the_estimate() {
         cutoff: None,
         motion: MotionSource::Auto,
         tolerance: Tolerance::default(),
-        level: 0.95,
+        ..Options::default()
     };
     let alone = identify(&model, std::slice::from_ref(&fit), &options).expect("a solution");
     // Another movement, another arm, noise, no force: nothing of it may be felt.
