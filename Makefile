@@ -20,7 +20,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
 
-.PHONY: help demo test bench bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows crates clean build format rust python
+.PHONY: help demo test bench bench-counts counts bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows crates clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -114,6 +114,15 @@ $(STAMPS)/peers: bench/peers/requirements.txt | $(STAMPS)/venv
 bench: build $(STAMPS)/peers ## speed, beside other tools
 	cargo build --quiet --release -p speed --example peer
 	PYTHONPATH=python $(VENV)/peers/bin/python bench/peers/compare.py -o out/bench
+
+bench-counts: build $(STAMPS)/peers ## `bench`, and the instructions beside every time: needs valgrind
+	cargo build --quiet --release -p speed --example peer
+	PYTHONPATH=python $(VENV)/peers/bin/python bench/peers/compare.py -o out/bench --count
+
+# The figures are stated for one version of the compiler.
+counts: $(STAMPS)/venv ## instructions of kernels, steps and a session against what is stated: needs valgrind
+	cargo build --quiet --release -p speed --example counts
+	$(BIN)/python scripts/counts.py
 
 bench-kernels: ## speed of every part by itself
 	cargo bench --quiet -p speed

@@ -1,14 +1,25 @@
-"""The comparison as a table in Markdown and as plots."""
+"""The comparison as tables in Markdown and as plots.
+
+    report.py [RESULT]
+
+puts the tables of a run into docs/performance.md, and keeps the run beside this file, so that a test can repeat the first from the
+second. `make bench` writes RESULT to out/bench/result.json; without it, the kept one is taken.
+"""
 
 from __future__ import annotations
 
+import json
 import statistics
+import sys
 from pathlib import Path
 from typing import Any
 
 import problem
 from workloads import GROUPS, JOINTS, MEASURED, Measured
 
+PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
+KEPT = Path(__file__).parent / "result.json"
+BEGIN, END = "<!-- bench: begin -->\n", "<!-- bench: end -->\n"
 TITLES = {
     "W1": "W1: kernels of the arm with three joints, a call",
     "W2": "W2: one run of 20 s, a step",
@@ -34,20 +45,29 @@ def time_of(seconds: float) -> str:
 
 
 def words(result: dict[str, Any]) -> str:
-    """Return the report as Markdown."""
+    """Return the report as Markdown, headings of the third level."""
     middle = medians(result["seconds"])
-    lines = ["# armrs beside other tools", "", "Medians of processor time unless a line says wall clock; all in one run, in turn.", ""]
-    lines += ["## Goals", "", "| line | ratio | found | aimed at | |", "| --- | --- | --- | --- | --- |"]
+    rounds = max(len(values) for values in result["seconds"].values())
+    versions = result["versions"]
+    machine = "; ".join(f"{name} {value}" for name, value in versions.items() if name != "date")
+    lines = [
+        f"{versions['date']}, {rounds} round{'s' if rounds > 1 else ''}; {machine}.",
+        "Medians of processor time, unless a line says wall clock. Each round measures every tool in turn.",
+        "",
+    ]
+    if result["missing"]:
+        lines += ["Not measured: " + "; ".join(f"{tool} ({reason})" for tool, reason in result["missing"].items()) + ".", ""]
+    lines += ["### Goals", "", "| ratio | found | aimed at | |", "| --- | --- | --- | --- |"]
     for goal in result["goals"]:
-        found = "not measured" if goal["found"] is None else f"{goal['found']:.3g}"
+        found = "not measured" if goal["found"] is None else f"{goal['found']:.3g}".replace("-", "−")
         mark = {None: "", True: "met", False: "**not met**"}[goal["met"]]
-        lines.append(f"| {goal['line']} | {goal['what']} | {found} | {'≤' if goal['at_most'] else '≥'} {goal['limit']:g} | {mark} |")
+        lines.append(f"| {goal['what']} | {found} | {'≤' if goal['at_most'] else '≥'} {goal['limit']:g} | {mark} |")
     lines += _imports(middle)
     for workload, title in TITLES.items():
-        lines += ["", f"## {title}", "", *_table(workload, result, middle)]
+        lines += ["", f"### {title}", "", *_table(workload, result, middle)]
     lines += [
         "",
-        "## Do all solve the same problem?",
+        "### Do all solve the same problem?",
         "",
         "Each against armrs.",
         "",
@@ -57,10 +77,21 @@ def words(result: dict[str, Any]) -> str:
     for check in result["checks"]:
         mark = "" if check["agrees"] else " **no**"
         lines.append(f"| {check['what']} | {check['tool']} | {check['found']:.2g}{mark} | {check['allowed']:.2g} |")
-    lines += ["", "## Versions", "", *(f"- {name}: {value}" for name, value in result["versions"].items())]
-    if result["missing"]:
-        lines += ["", "## Skipped", "", *(f"- {tool}: {reason}" for tool, reason in result["missing"].items())]
     return "\n".join(lines) + "\n"
+
+
+def page(result: dict[str, Any], text: str) -> str:
+    """Return the page with the tables of a run in place of those between its marks. Only a whole run takes their place."""
+    lacking = [f"{tool}: {reason}" for tool, reason in result["missing"].items()]
+    lacking += [f"{check['what']} of {check['tool']} does not agree" for check in result["checks"] if not check["agrees"]]
+    lacking += [f"{goal['what']}: not measured" for goal in result["goals"] if goal["found"] is None]
+    if lacking:
+        raise SystemExit(f"report.py: the page takes a whole run: {lacking[0]}" + (f", and {len(lacking) - 1} more" if lacking[1:] else ""))
+    before, _, rest = text.partition(BEGIN)
+    _, found, after = rest.partition(END)
+    if not found:
+        raise SystemExit(f"report.py: {PAGE.name}: no tables between {BEGIN.strip()} and {END.strip()}")
+    return before + BEGIN + words(result) + END + after
 
 
 def _table(workload: str, result: dict[str, Any], middle: dict[str, float]) -> list[str]:
@@ -107,7 +138,7 @@ def _chosen(rung: dict[str, Any]) -> dict[str, str]:
 
 def _imports(middle: dict[str, float]) -> list[str]:
     empty = middle["import/empty"]
-    lines = ["", "## W5: import, beyond an empty start of Python", "", "| module | time |", "| --- | --- |"]
+    lines = ["", "### W5: import, beyond an empty start of Python", "", "| module | time |", "| --- | --- |"]
     for key, seconds in middle.items():
         if key.startswith("import/") and key != "import/empty":
             lines.append(f"| {key.removeprefix('import/')} | {time_of(max(seconds - empty, 0.0))} |")
@@ -150,3 +181,14 @@ def plots(result: dict[str, Any], folder: Path) -> None:
         axes.grid(alpha=0.3)
         figure.savefig(folder / f"{name}.svg")
         plt.close(figure)
+
+
+def main() -> None:
+    """Write the page, and keep the run."""
+    text = Path(sys.argv[1] if sys.argv[1:] else KEPT).read_text(encoding="utf-8")
+    PAGE.write_text(page(json.loads(text), PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    KEPT.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -161,27 +161,6 @@ impl Peer {
             ["run"] => self.run(euler, Some(0.02)),
             ["run", "ends"] => self.run(euler, Some(20.0)),
             ["run", "fourth"] => self.run(Integrator::Rk4, Some(0.02)),
-            ["accurate", substeps] => {
-                let experiment = accurate(&run(euler, 20.0, Some(0.02)), substeps);
-                seconds_of(|| simulate(black_box(&experiment)).expect("runs"))
-            }
-            ["check", "accurate", substeps] => {
-                recorded(&accurate(&run(euler, 20.0, Some(0.02)), substeps))
-            }
-            ["batch", "accurate", substeps] => {
-                let runs: Vec<_> = batch().iter().map(|run| accurate(run, substeps)).collect();
-                seconds_of(|| simulate_batch(black_box(&runs), 1))
-            }
-            ["check", "batch", "accurate", substeps] => {
-                let runs: Vec<_> = batch().iter().map(|run| accurate(run, substeps)).collect();
-                let done = simulate_batch(&runs, 1);
-                let some = done.iter().step_by(EVERY);
-                json(
-                    &some
-                        .flat_map(|run| run.as_ref().expect("runs").q.clone())
-                        .collect::<Vec<_>>(),
-                )
-            }
             ["check", "batch"] => {
                 let done = simulate_batch(&batch(), 1);
                 let ends = done[done.len() - 4..].iter().flat_map(|r| {
@@ -217,7 +196,7 @@ impl Peer {
                 let (q, force) = self.samples(n);
                 seconds_of(|| cascade(black_box(&q), black_box(&force)))
             }
-            _ => "null".into(),
+            ref words => right_to_an_accuracy(words),
         }
     }
 
@@ -299,6 +278,33 @@ fn run(integrator: Integrator, duration: f64, interval: Option<f64>) -> Experime
     experiment.integrator = integrator;
     experiment.output_interval = interval;
     experiment
+}
+
+/// W2a and W3a.
+fn right_to_an_accuracy(task: &[&str]) -> String {
+    let single = |substeps| {
+        let whole = run(Integrator::SemiImplicitEuler, 20.0, Some(0.02));
+        accurate(&whole, substeps)
+    };
+    let all = |substeps| -> Vec<_> { batch().iter().map(|run| accurate(run, substeps)).collect() };
+    match *task {
+        ["accurate", substeps] => {
+            let experiment = single(substeps);
+            seconds_of(|| simulate(black_box(&experiment)).expect("runs"))
+        }
+        ["check", "accurate", substeps] => recorded(&single(substeps)),
+        ["batch", "accurate", substeps] => {
+            let runs = all(substeps);
+            seconds_of(|| simulate_batch(black_box(&runs), 1))
+        }
+        ["check", "batch", "accurate", substeps] => {
+            let done = simulate_batch(&all(substeps), 1);
+            let some = done.iter().step_by(EVERY);
+            let angles = some.flat_map(|run| run.as_ref().expect("runs").q.clone());
+            json(&angles.collect::<Vec<_>>())
+        }
+        _ => "null".into(),
+    }
 }
 
 /// The experiment as it is run where its angles have to be right to an accuracy: in so many steps of fourth order from one sample to the next.

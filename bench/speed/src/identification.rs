@@ -92,7 +92,7 @@ pub fn joint(n: usize) -> (Model<3>, [Trial<3>; 1], Options) {
         cutoff: Some(5.0),
         motion: MotionSource::Measured,
         tolerance: Tolerance::default(),
-        level: 0.95,
+        ..Options::default()
     };
     (model(effects([[0.0; 3]; 2])), [trial], options)
 }
