@@ -71,6 +71,7 @@ __all__ = [
     "Tried",
     "Value",
     "__version__",
+    "bounded_least_squares",
     "build_profile",
     "channel_names",
     "confirmed",
