@@ -90,18 +90,21 @@ COARSE = _ladder(*range(2, 17), *range(18, 41, 2))
 """From 10 ms to 0.5 ms, for methods of second and fourth order."""
 FINE = _ladder(*range(40, 161, 4))
 """From 0.5 ms to 0.125 ms, for methods of first order."""
+FOUND = ("1e-6",)
+"""The accuracy itself [rad]."""
 TOLERANCES = tuple(f"{digit}e-{power}" for power in range(4, 11) for digit in (5, 2, 1))
 """Relative, and absolute [rad, rad/s]."""
 
 
 def _accurate() -> list[Measured]:
-    # For armrs a task without a ladder takes its place as soon as a run has an accuracy instead of a step.
     rows = [
         ("limit", "accurate:euler", "semi-implicit Euler at 0.25 ms", EULER),
         ("limit", "accurate:rk4", "fourth order", COARSE),
         ("limit", "accurate:rk4_table", "fourth order, the path from a table", COARSE),
         ("armrs, Rust", "accurate", "fourth order", COARSE),
+        ("armrs, Rust", "accurate:found", "the step found by comparing runs, included", FOUND),
         ("armrs, Python", "accurate", "armrs.simulate, fourth order", COARSE),
+        ("armrs, Python", "accurate:found", "armrs.simulate, the step found by comparing runs, included", FOUND),
         ("numba", "accurate:rk4", "fourth order", COARSE),
         ("numba", "accurate:dop853", "SciPy's DOP853", TOLERANCES),
         ("numba", "accurate:lsoda", "SciPy's LSODA (odeint)", TOLERANCES),
@@ -117,6 +120,7 @@ def _accurate() -> list[Measured]:
         ("limit", "batch:accurate:rk4_avx2", "fourth order, four runs in a register", COARSE),
         ("limit", "batch:accurate:rk4_avx512", "fourth order, eight runs in a register or two", COARSE),
         ("armrs, Rust", "batch:accurate", "simulate_batch, fourth order, one thread", COARSE),
+        ("armrs, Rust", "batch:accurate:found", "simulate_accurately, one thread", FOUND),
         ("MuJoCo, Python", "batch:accurate:rk4", "rollout of 20 of the runs, RK4, path held over a step", COARSE),
     ]
     single = [Measured("W2a", tool, task, name, ladder=ladder) for tool, task, name, ladder in rows]

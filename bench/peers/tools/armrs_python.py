@@ -46,8 +46,13 @@ def run(of: armrs.Model = usual, integrator: str = "euler", dt: float = problem.
 
 
 def accurate(substeps: str) -> armrs.Simulated:
-    """Simulate 20 s right to an accuracy."""
+    """Simulate 20 s with so many steps of fourth order from one sample to the next."""
     return run(integrator="rk4", dt=problem.RECORD * problem.STEP / int(substeps))
+
+
+def found(accuracy: str) -> armrs.Simulated:
+    """Simulate 20 s with the step that is found for an accuracy."""
+    return armrs.simulate(usual, movement, accuracy=float(accuracy), duration=problem.LONG)
 
 
 def write_fit() -> bool:
@@ -86,6 +91,8 @@ def batch(kernel: line.Task) -> dict[str, float]:
 line.serve(
     {
         "accurate": lambda n: line.seconds_of(lambda: accurate(n)),
+        "accurate:found": lambda a: line.seconds_of(lambda: found(a)),
+        "check:accurate:found": lambda a: found(a).q.ravel().tolist(),
         "check:accurate": lambda n: accurate(n).q.ravel().tolist(),
         "check:forward_dynamics": lambda: arm.forward_dynamics(q, qd, third).ravel().tolist(),
         "check:inverse_dynamics": lambda: arm.inverse_dynamics(q, qd, third).ravel().tolist(),

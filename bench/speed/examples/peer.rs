@@ -8,7 +8,7 @@ use arm_core::{
 use arm_core::{Segment, models as arms};
 use arm_ident::cascade::quasi_static::{Cascade, Stream};
 use arm_ident::regression::trial::Model;
-use arm_sim::{Experiment, Integrator, models, simulate, simulate_batch};
+use arm_sim::{Experiment, Integrator, models, simulate, simulate_accurately, simulate_batch};
 use cpu_time::ProcessTime;
 use std::hint::black_box;
 use std::io::{BufRead, Write};
@@ -293,6 +293,24 @@ fn right_to_an_accuracy(task: &[&str]) -> String {
             seconds_of(|| simulate(black_box(&experiment)).expect("runs"))
         }
         ["check", "accurate", substeps] => recorded(&single(substeps)),
+        ["accurate", "found", accuracy] => {
+            let (runs, accuracy) = ([single("1")], number(accuracy));
+            seconds_of(|| simulate_accurately(black_box(&runs), accuracy, 1))
+        }
+        ["check", "accurate", "found", accuracy] => {
+            let mut found = simulate_accurately(&[single("1")], number(accuracy), 1);
+            json(&found.remove(0).expect("runs").0.q)
+        }
+        ["batch", "accurate", "found", accuracy] => {
+            let (runs, accuracy) = (all("1"), number(accuracy));
+            seconds_of(|| simulate_accurately(black_box(&runs), accuracy, 1))
+        }
+        ["check", "batch", "accurate", "found", accuracy] => {
+            let done = simulate_accurately(&all("1"), number(accuracy), 1);
+            let some = done.iter().step_by(EVERY);
+            let angles = some.flat_map(|run| run.as_ref().expect("runs").0.q.clone());
+            json(&angles.collect::<Vec<_>>())
+        }
         ["batch", "accurate", substeps] => {
             let runs = all(substeps);
             seconds_of(|| simulate_batch(black_box(&runs), 1))
@@ -307,11 +325,15 @@ fn right_to_an_accuracy(task: &[&str]) -> String {
     }
 }
 
+fn number(text: &str) -> f64 {
+    text.parse().expect("a number")
+}
+
 /// The experiment as it is run where its angles have to be right to an accuracy: in so many steps of fourth order from one sample to the next.
 fn accurate(experiment: &Experiment<3>, substeps: &str) -> Experiment<3> {
     let mut experiment = experiment.clone();
     experiment.integrator = Integrator::Rk4;
-    experiment.dt = 0.02 / substeps.parse::<f64>().expect("a number of steps");
+    experiment.dt = 0.02 / number(substeps);
     experiment
 }
 
