@@ -122,7 +122,7 @@ def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
         figure.set_dpi(130)
         canvas = FigureCanvasAgg(figure)
         engine = figure.get_layout_engine()
-        if engine is not None:
+        if figure.axes and engine is not None:
             engine.execute(figure)
             figure.set_layout_engine("none")
         # `savefig` would lay the figure out twice, and draw it once more to no end.
