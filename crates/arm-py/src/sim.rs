@@ -8,6 +8,7 @@ use arm_sim::{
     Piece, Sensors, Series, Start,
 };
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn};
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
@@ -186,9 +187,18 @@ pub fn resolve<'py>(
         (drive, settings, accuracy): (&Driven<'py>, &Settings, f64),
     ) -> PyResult<(f64, f64)> {
         let experiment = experiment(chain, rig, drive, settings)?;
-        let outcome = py.detach(|| arm_sim::resolve(&experiment, accuracy));
+        let mut interrupted = None;
+        let mut go_on = || match Python::attach(|py| py.check_signals()) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(signal) => {
+                interrupted = Some(signal);
+                ControlFlow::Break(())
+            }
+        };
+        let outcome = py.detach(|| arm_sim::resolve(&experiment, accuracy, &mut go_on));
         crate::own::failed()?;
-        let resolved = outcome.map_err(simulation)?;
+        let broken_off = || interrupted.unwrap_or_else(|| PyKeyboardInterrupt::new_err(()));
+        let resolved = outcome.map_err(simulation)?.ok_or_else(broken_off)?;
         Ok((resolved.dt, resolved.error))
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, accuracy)))

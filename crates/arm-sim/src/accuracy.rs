@@ -28,8 +28,8 @@ const AIM: f64 = 0.7;
 const FINER: (f64, f64) = (1.5, 8.0);
 /// Shortest step that is tried \[s\].
 const SHORTEST: f64 = 1e-6;
-/// Samples that a streamed run holds.
-const PIECE: usize = 16384;
+/// Samples after which [`resolve`] asks whether to go on: with the shortest step, half a second at 50 Hz.
+const PIECE: usize = 64;
 
 /// The step of a run, and how far its angles are from those of an ever finer one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,58 +63,64 @@ pub fn simulate_accurately<const N: usize>(
     accuracy: f64,
     threads: usize,
 ) -> Vec<Result<(Recording<N>, Resolved), SimulationError>> {
-    let mut searches: Vec<_> = experiments
-        .iter()
-        .map(|experiment| Search::new(experiment, accuracy))
-        .collect();
-    let mut done: Vec<Option<Result<_, _>>> = searches
-        .iter()
-        .map(|search| search.as_ref().err().cloned().map(Err))
-        .collect();
-    loop {
-        let mut pending: Vec<usize> = (0..done.len()).filter(|&i| done[i].is_none()).collect();
-        if pending.is_empty() {
-            return done.into_iter().flatten().collect();
-        }
-        // Equal steps side by side.
-        pending.sort_by_key(|&i| searches[i].as_ref().map_or(0, |search| search.steps));
-        let runs: Vec<Experiment<N>> = pending
-            .iter()
-            .filter_map(|&i| searches[i].as_ref().ok())
-            .map(|search| search.experiment.clone())
-            .collect();
-        for (i, run) in pending.into_iter().zip(simulate_batch(&runs, threads)) {
-            let Ok(search) = &mut searches[i] else {
-                continue;
-            };
-            let judged = search.judge(run.as_ref().map(|run| [&run.q[..], &run.qd[..]]));
-            done[i] = match (judged, run) {
-                (Ok(None), _) => None,
-                (Ok(Some(resolved)), Ok(recording)) => Some(Ok((recording, resolved))),
-                (Err(error), _) | (_, Err(error)) => Some(Err(error)),
-            };
+    let (mut done, mut pending) = (Vec::new(), Vec::new());
+    for (i, experiment) in experiments.iter().enumerate() {
+        match Search::new(experiment, accuracy) {
+            Ok(search) => {
+                pending.push((i, search));
+                done.push(None);
+            }
+            Err(error) => done.push(Some(Err(error))),
         }
     }
+    while !pending.is_empty() {
+        // Equal steps side by side.
+        pending.sort_by_key(|(_, search)| search.steps);
+        let runs: Vec<_> = pending.iter().map(|(_, s)| s.experiment.clone()).collect();
+        let runs = simulate_batch(&runs, threads);
+        let judged = pending
+            .into_iter()
+            .zip(runs)
+            .filter_map(|((i, mut search), run)| {
+                let judged = search.judge(run.as_ref().map(|run| [&run.q[..], &run.qd[..]]));
+                done[i] = Some(match (judged, run) {
+                    (Ok(None), _) => return Some((i, search)),
+                    (Ok(Some(resolved)), Ok(recording)) => Ok((recording, resolved)),
+                    (Err(error), _) | (_, Err(error)) => Err(error),
+                });
+                None
+            });
+        pending = judged.collect();
+    }
+    done.into_iter().flatten().collect()
 }
 
 /// The step of [`simulate_accurately`] for one experiment; of the runs nothing but their angles is kept.
+///
+/// * `go_on` - asked every now and then; `None` where it breaks the search off
 ///
 /// # Errors
 /// As [`simulate_accurately`].
 pub fn resolve<const N: usize>(
     experiment: &Experiment<N>,
     accuracy: f64,
-) -> Result<Resolved, SimulationError> {
+    go_on: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Option<Resolved>, SimulationError> {
     let mut search = Search::new(experiment, accuracy)?;
     search.columns = Columns::Motion;
     loop {
-        let (mut q, mut qd) = (Vec::new(), Vec::new());
+        let (mut q, mut qd, mut asked) = (Vec::new(), Vec::new(), ControlFlow::Continue(()));
         let run = simulate_in_pieces(Engine::Native, &search.experiment, PIECE, &mut |piece| {
             q.extend_from_slice(&piece.recording.q);
             qd.extend_from_slice(&piece.recording.qd);
-            ControlFlow::Continue(())
+            asked = go_on();
+            asked
         });
-        if let Some(resolved) = search.judge(run.as_ref().map(|()| [&q[..], &qd[..]]))? {
+        if asked.is_break() {
+            return Ok(None);
+        }
+        let resolved = search.judge(run.as_ref().map(|()| [&q[..], &qd[..]]))?;
+        if resolved.is_some() {
             return Ok(resolved);
         }
     }
@@ -183,7 +189,7 @@ impl<const N: usize> Search<N> {
         };
         search.experiment.integrator = Integrator::Rk4;
         search.experiment.columns = Columns::Motion;
-        search.refine(interval / (FIRST * largest))?;
+        search.divide((interval / (FIRST * largest)).min(interval / SHORTEST));
         Ok(search)
     }
 
@@ -210,18 +216,34 @@ impl<const N: usize> Search<N> {
         let [angles, speeds] = match run {
             Ok(columns) => columns,
             // A step that is too long may end the run.
-            Err(SimulationError::TooStiff { .. } | SimulationError::Diverged { .. }) => {
+            Err(SimulationError::TooStiff { .. } | SimulationError::Diverged { .. })
+                if self.experiment.dt > 2.0 * SHORTEST =>
+            {
                 self.coarser.clear();
                 self.experiment.columns = Columns::Motion;
-                return self.refine(2.0 * self.steps as f64).map(|()| None);
+                self.divide(2.0 * self.steps as f64);
+                return Ok(None);
             }
             Err(error) => return Err(error.clone()),
         };
         let error = self.error(angles);
-        if let Some(error) = error.filter(|error| *error <= self.accuracy) {
-            let dt = self.experiment.dt;
-            return Ok(Some(Resolved { dt, error }));
-        }
+        let (steps, dt) = (self.steps as f64, self.experiment.dt);
+        let finer = match error {
+            Some(error) if error <= self.accuracy => return Ok(Some(Resolved { dt, error })),
+            Some(error) => {
+                let foretold = libm::pow(error / (AIM * self.accuracy), 1.0 / ORDER);
+                let finer = foretold.max(FINER.0).min(FINER.1);
+                if dt / finer < SHORTEST {
+                    return Err(SimulationError::Accuracy {
+                        asked: self.accuracy,
+                        reached: error,
+                        dt,
+                    });
+                }
+                finer
+            }
+            None => FINER.0,
+        };
         self.experiment.columns = self.columns;
         self.start_as_before([angles, speeds]);
         if self.coarser.len() == self.compared() {
@@ -231,18 +253,7 @@ impl<const N: usize> Search<N> {
             steps: self.steps,
             angles: angles.to_vec(),
         });
-        let least = FINER.0 * self.steps as f64;
-        let foretold = error.map_or(least, |error| {
-            self.steps as f64 * libm::pow(error / (AIM * self.accuracy), 1.0 / ORDER)
-        });
-        let most = FINER.1 * self.steps as f64;
-        let error = error.unwrap_or(f64::INFINITY);
-        self.refine(foretold.max(least).min(most))
-            .map_err(|_| SimulationError::Accuracy {
-                asked: self.accuracy,
-                reached: error,
-                dt: self.experiment.dt,
-            })?;
+        self.divide(finer * steps);
         Ok(None)
     }
 
@@ -268,18 +279,9 @@ impl<const N: usize> Search<N> {
     }
 
     /// Takes at least so many steps from sample to sample.
-    fn refine(&mut self, steps: f64) -> Result<(), SimulationError> {
+    fn divide(&mut self, steps: f64) {
         let steps = (steps - 1e-9).ceil().max(1.0);
-        let dt = self.interval / steps;
-        if dt < SHORTEST {
-            return Err(SimulationError::Accuracy {
-                asked: self.accuracy,
-                reached: f64::INFINITY,
-                dt: self.experiment.dt,
-            });
-        }
         self.steps = steps as usize;
-        self.experiment.dt = dt;
-        Ok(())
+        self.experiment.dt = self.interval / steps;
     }
 }

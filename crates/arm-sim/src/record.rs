@@ -126,6 +126,15 @@ impl<const N: usize> Recording<N> {
             + w.damped[i]
     }
 
+    /// The same at the first sample; zero where no energy is recorded.
+    pub(crate) fn first_balance(&self) -> f64 {
+        if self.energy.kinetic.is_empty() {
+            0.0
+        } else {
+            self.balance(0)
+        }
+    }
+
     /// Every column with its name and number of entries a sample, in a fixed order.
     pub fn columns(&self) -> [(&'static str, usize, &[f64]); 28] {
         let (t, e, w, effects) = (&self.torque, &self.energy, &self.work, self.effects.len());
@@ -176,15 +185,10 @@ pub struct Piece<'a, const N: usize> {
 impl<'a, const N: usize> From<&'a Recording<N>> for Piece<'a, N> {
     /// A whole run.
     fn from(recording: &'a Recording<N>) -> Self {
-        let balance = if recording.is_empty() {
-            0.0
-        } else {
-            recording.balance(0)
-        };
         Self {
             recording,
             from: 0,
-            balance,
+            balance: recording.first_balance(),
         }
     }
 }
@@ -192,7 +196,7 @@ impl<'a, const N: usize> From<&'a Recording<N>> for Piece<'a, N> {
 impl<const N: usize> Piece<'_, N> {
     /// Change of stored energy since the start of the run less the work that explains it, for each sample \[J\].
     pub fn energy_error(&self) -> Vec<f64> {
-        let samples = 0..self.recording.len();
+        let samples = 0..self.recording.energy.kinetic.len();
         samples
             .map(|i| self.recording.balance(i) - self.balance)
             .collect()

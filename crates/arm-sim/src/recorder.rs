@@ -315,8 +315,8 @@ impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
         let Some(Pieces { take, .. }) = &mut self.pieces else {
             return ControlFlow::Continue(());
         };
-        if self.from == 0 && !self.recording.energy.kinetic.is_empty() {
-            self.balance = self.recording.balance(0);
+        if self.from == 0 {
+            self.balance = self.recording.first_balance();
         }
         let piece = Piece {
             recording: &self.recording,

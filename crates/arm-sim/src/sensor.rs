@@ -150,6 +150,13 @@ impl<const N: usize> Sensors<N> {
             noises.push((channel, Noise::new(normal, deviation, time, interval)));
         }
         let clock = Clock::of(&recording.time)?;
+        if recording.force_on_arm.is_empty() {
+            return Err(SimulationError::Samples {
+                name: "contact force",
+                sample: 1,
+                problem: "the motion alone was recorded",
+            });
+        }
         let delay = experiment.altered()?.force_delay;
 
         let mut readings = Readings::default();

@@ -1,12 +1,23 @@
 //! Runs whose step is found for an accuracy: what they promise, against ever shorter steps.
 
+use core::ops::ControlFlow;
+
 use arm_core::effect::{Effect, Kind};
 use arm_sim::{
-    Columns, Experiment, Integrator, SimulationError, digest, models, resolve, simulate,
-    simulate_accurately, simulate_batch,
+    Columns, Experiment, Integrator, Resolved, Sensors, SimulationError, digest, models, resolve,
+    simulate, simulate_accurately, simulate_batch,
 };
 
 use crate::common::{largest, run, several_effects, smooth};
+
+/// As `resolve`, never broken off.
+fn step_of<const N: usize>(
+    experiment: &Experiment<N>,
+    accuracy: f64,
+) -> Result<Resolved, SimulationError> {
+    let found = resolve(experiment, accuracy, &mut || ControlFlow::Continue(()))?;
+    Ok(found.expect("not broken off"))
+}
 
 fn sampled<const N: usize>(mut experiment: Experiment<N>) -> Experiment<N> {
     experiment.output_interval = Some(0.02);
@@ -76,7 +87,7 @@ fn it_is_the_run_of_the_step_that_it_tells() {
     let mut again = experiment.clone();
     (again.integrator, again.dt) = (Integrator::Rk4, resolved.dt);
     assert_eq!(digest(&recording), digest(&simulate(&again).expect("runs")));
-    assert_eq!(resolve(&experiment, 1e-6).expect("runs"), resolved);
+    assert_eq!(step_of(&experiment, 1e-6).expect("runs"), resolved);
 }
 
 #[test]
@@ -106,14 +117,14 @@ fn a_run_has_the_same_bits_alone_and_beside_others() {
 #[test]
 fn what_cannot_be_reached_is_refused() {
     let experiment = sampled(models::human_experiment(0.1, [0.0; 3]).expect("valid"));
-    let refused = resolve(&experiment, 1e-18).expect_err("beyond rounding");
+    let refused = step_of(&experiment, 1e-18).expect_err("beyond rounding");
     let SimulationError::Accuracy { asked, reached, .. } = refused else {
         panic!("{refused}");
     };
     assert!(asked < reached && reached < 1e-9, "{refused}");
     for accuracy in [0.0, -1.0, f64::NAN] {
         assert!(matches!(
-            resolve(&experiment, accuracy),
+            step_of(&experiment, accuracy),
             Err(SimulationError::Setting {
                 name: "accuracy",
                 ..
@@ -123,12 +134,34 @@ fn what_cannot_be_reached_is_refused() {
     let mut unsampled = experiment;
     unsampled.output_interval = None;
     assert!(matches!(
-        resolve(&unsampled, 1e-6),
+        step_of(&unsampled, 1e-6),
         Err(SimulationError::Setting {
             name: "output interval",
             ..
         })
     ));
+}
+
+#[test]
+fn a_search_can_be_broken_off() {
+    let experiment = sampled(models::human_experiment(2.0, [0.0; 3]).expect("valid"));
+    let mut asked = 0;
+    let found = resolve(&experiment, 1e-6, &mut || {
+        asked += 1;
+        ControlFlow::Break(())
+    });
+    assert_eq!((found, asked), (Ok(None), 1));
+}
+
+#[test]
+fn a_contact_too_stiff_for_the_shortest_step_is_called_that() {
+    let mut experiment = sampled(models::human_experiment(0.1, [0.0; 3]).expect("valid"));
+    experiment.setup.contact.stiffness = [1e15; 2];
+    let refused = step_of(&experiment, 1e-6).expect_err("too stiff");
+    assert!(
+        matches!(refused, SimulationError::TooStiff { .. }),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -142,6 +175,9 @@ fn motion_alone_has_the_bits_of_all_columns() {
         (&all.time, &all.q, &all.qd)
     );
     assert!(alone.force_on_arm.is_empty() && alone.robot_q.is_empty());
+    assert!(alone.energy_error().is_empty());
+    let read = Sensors::ideal().read(&experiment, &alone);
+    assert!(matches!(read, Err(SimulationError::Samples { .. })));
     let runs = vec![experiment; 3];
     for beside in simulate_batch(&runs, 1) {
         assert_eq!(beside.expect("runs"), alone);
