@@ -8,7 +8,6 @@ pub mod measurement_model;
 pub mod results;
 pub mod selection;
 pub mod sensitivity;
-pub use arm_ident::threads;
 pub mod trial_specific;
 
 pub use error::GapError;

@@ -10,7 +10,7 @@ use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::results as core;
 use arm_gap::results::{Asked, TrialFile, Version};
 use arm_gap::selection::model_discrimination::Contest;
-use arm_gap::threads::parallel;
+use arm_ident::threads::parallel;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 

@@ -70,15 +70,14 @@ impl<const N: usize> Session<N> {
             identify(&model, trials, &options)
         };
         // Test trials decide nothing.
-        let fit = self.first_repeats(usize::MAX);
+        let fit = self.fit_trials().into_iter();
+        let fit: Vec<_> = fit.map(|i| self.trials[i].clone()).collect();
         let Ok(mut found) = along(MotionSource::Measured, &fit) else {
             return self;
         };
         let noisy = found.speed_noise.iter().any(|&noise| noise > NOISY);
         if noisy && self.comparison == ComparisonMode::Led {
-            // Two repeats tell what repeats differ by; to simulate all of them again and again would take longer than the search, which
-            // refits what it starts from with all.
-            found = along(MotionSource::Auto, &self.first_repeats(2)).unwrap_or(found);
+            found = along(MotionSource::Auto, &self.first_repeats()).unwrap_or(found);
         }
         let laws = self.hidden_by_friction(estimated(&found), (&found, &model));
         let still = match self.comparison {
@@ -123,14 +122,17 @@ impl<const N: usize> Session<N> {
         self
     }
 
-    /// The first fit trials of each movement.
-    fn first_repeats(&self, most: usize) -> Vec<Trial<N>> {
+    /// The first fit trials of each movement. The search starts from what these tell and refits it with all; two tell what repeats differ
+    /// by, and to simulate all of them again and again would take longer than the search.
+    fn first_repeats(&self) -> Vec<Trial<N>> {
+        /// Of each movement.
+        const REPEATS: usize = 2;
         let mut taken = BTreeMap::new();
         let fit = self.trials.iter().filter(|t| t.role == Role::Fit);
         fit.filter(|t| {
             let count = taken.entry(t.configuration).or_insert(0);
             *count += 1;
-            *count <= most
+            *count <= REPEATS
         })
         .cloned()
         .collect()
@@ -342,7 +344,7 @@ mod tests {
             ..one.clone()
         })
         .collect();
-        let taken: Vec<f64> = session.first_repeats(2).iter().map(|t| t.rate).collect();
+        let taken: Vec<f64> = session.first_repeats().iter().map(|t| t.rate).collect();
         assert_eq!(taken, [100.0, 102.0, 103.0]);
     }
 

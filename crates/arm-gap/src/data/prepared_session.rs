@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
+use arm_ident::threads::parallel;
+
 use crate::GapError;
 use crate::data::noise::Noise;
 use crate::data::repeats::groups;
@@ -11,7 +13,6 @@ use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::measurement_model::prediction::{Channels, Course};
 use crate::sensitivity::linearized_run::Linear;
 use crate::sensitivity::response::Response;
-use crate::threads;
 
 /// How long a disturbance is felt before and after, the low-pass and the error of its timing included \[s\].
 const AROUND: (f64, f64) = (0.5, 0.5);
@@ -220,6 +221,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// Results of jobs in their order, whatever the number of threads.
     pub fn parallel<R: Send>(&self, jobs: usize, one: impl Fn(usize) -> R + Sync) -> Vec<R> {
-        threads::parallel(self.threads, jobs, one)
+        parallel(self.threads, jobs, one)
     }
 }
