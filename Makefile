@@ -113,11 +113,10 @@ $(STAMPS)/peers: bench/peers/requirements.txt | $(STAMPS)/venv
 
 bench: build $(STAMPS)/peers ## speed, beside other tools
 	cargo build --quiet --release -p speed --example peer
-	PYTHONPATH=python $(VENV)/peers/bin/python bench/peers/compare.py -o out/bench
+	PYTHONPATH=python $(VENV)/peers/bin/python bench/peers/compare.py -o out/bench $(COUNT)
 
-bench-counts: build $(STAMPS)/peers ## `bench`, and the instructions beside every time: needs valgrind
-	cargo build --quiet --release -p speed --example peer
-	PYTHONPATH=python $(VENV)/peers/bin/python bench/peers/compare.py -o out/bench --count
+bench-counts: COUNT := --count
+bench-counts: bench ## `bench`, and the instructions beside every time: needs valgrind
 
 # The figures are stated for one version of the compiler.
 counts: $(STAMPS)/venv ## instructions of kernels, steps and a session against what is stated: needs valgrind

@@ -266,14 +266,10 @@ static void print_some(const double *all) {
     print_values(some[0], sizeof some / sizeof(double));
 }
 
-static void answer_batch(int check, int width, long substeps) {
+// `call` makes the batch; it gets where the angles of every run go, or NULL.
+template <class Call> static void answer_batch(int check, Call call) {
     static double all[RUNS * 3 * SHORT_SAMPLES];
-    double *table = half_table(substeps, SHORT), seconds;
-    const auto call = [&](double *to) {
-        if (width == 1) batch_fourth<1>(substeps, table, to);
-        if (width == 4) batch_fourth<4>(substeps, table, to);
-        if (width == 8) batch_fourth<8>(substeps, table, to);
-    };
+    double seconds;
     if (check) {
         call(all);
         print_some(all);
@@ -281,6 +277,11 @@ static void answer_batch(int check, int width, long substeps) {
         SECONDS_OF(seconds, call(NULL));
         printf("{\"seconds\": %.9g}", seconds);
     }
+}
+
+template <int W> static void answer_fourth(int check, long substeps) {
+    double *table = half_table(substeps, SHORT);
+    answer_batch(check, [=](double *to) { batch_fourth<W>(substeps, table, to); });
     free(table);
 }
 
@@ -298,21 +299,13 @@ static int accurate(int check, const char *word) {
         ANSWER(check, run_fourth<1>(arm, starts, substeps, LONG, table, long_record), long_record, count);
         free(table);
     } else if (!strcmp(word, "batch:accurate:euler:80")) {
-        double seconds;
-        static double all[RUNS * 3 * SHORT_SAMPLES];
-        if (check) {
-            batch_euler<4>(all);
-            print_some(all);
-        } else {
-            SECONDS_OF(seconds, batch_euler<4>());
-            printf("{\"seconds\": %.9g}", seconds);
-        }
+        answer_batch(check, [](double *to) { batch_euler<4>(to); });
     } else if (sscanf(word, "batch:accurate:rk4_scalar:%ld", &substeps) == 1) {
-        answer_batch(check, 1, substeps);
+        answer_fourth<1>(check, substeps);
     } else if (sscanf(word, "batch:accurate:rk4_avx2:%ld", &substeps) == 1) {
-        answer_batch(check, 4, substeps);
+        answer_fourth<4>(check, substeps);
     } else if (sscanf(word, "batch:accurate:rk4_avx512:%ld", &substeps) == 1) {
-        answer_batch(check, 8, substeps);
+        answer_fourth<8>(check, substeps);
     } else {
         return 0;
     }
