@@ -20,14 +20,14 @@ pub(crate) use instant::{Friction, at};
 use core::cell::OnceCell;
 
 use arm_core::Joints;
-use instant::{Mode, Modes, Solved, modes};
+use instant::{Arm, Mode, Modes, Solved};
 use locate::{LOCATED, first_beyond};
 
 use crate::model::{Link, Model};
 use crate::state::{BaseMotion, Input, State};
 use crate::step::{self, Inputs, Jam, Memory, PROJECTIONS, remember, rk4};
 use crate::{Handle, Integrator};
-use arm_core::effect::{Motion, States};
+use arm_core::effect::States;
 
 /// Switches that are located in one step.
 const MOST_SWITCHES: usize = 12;
@@ -81,7 +81,8 @@ fn switching<const N: usize>(
     let (mut from, mut switches) = (0.0, 0);
     while switches < MOST_SWITCHES {
         let start = input_at(inputs, h, from);
-        let (modes, first) = modes(model, &start, (&state.q, &state.qd), &memory.state, None);
+        let arm = Arm::at(model, &start, (&state.q, &state.qd));
+        let (modes, first) = arm.modes(&memory.state, None);
         if let Some((joint, gain)) = first.jam {
             return stop(start.time, (joint, gain), (state, memory));
         }
@@ -98,7 +99,7 @@ fn switching<const N: usize>(
             modes,
             first,
         };
-        let to = part.end(&start, &memory.kept);
+        let to = part.end(&arm, &memory.kept);
         let margin = part.attempt(to, (state, memory));
         if margin >= 0.0 || margin.is_nan() {
             from = to;
@@ -132,44 +133,42 @@ impl<const N: usize> Part<'_, N> {
     ///
     /// Friction that falls with speed makes a joint that begins to slip run away from rest; the step must not be longer than
     /// that takes, or the slip begins a step too late.
-    fn end(&self, input: &Input<f64, N>, memory: &[States<f64>]) -> f64 {
+    fn end(&self, arm: &Arm<'_, N>, memory: &[States<f64>]) -> f64 {
         let rest = 1.0 - self.from;
         if !self.model.dry_falls {
             return 1.0;
         }
-        let at = (&self.before.q, &self.before.qd);
+        let qd = &self.before.qd;
         // Friction of the instant, unless a joint force was in it.
         let known = (!self.model.feels_joint_force).then_some(self.first.most);
         let yielding = OnceCell::new();
-        let yields = || *yielding.get_or_init(|| growth::yielding(self.model, input, at));
-        let length = |speed: &Joints<f64, N>, most| {
-            let motion = Motion::new(input.time, *at.0, *speed);
+        let yields = || *yielding.get_or_init(|| arm.yielding());
+        // The speeds to which joints may slow down within a length: slower joints are in steeper friction.
+        let slower = |length: f64| {
+            Joints::<f64, N>::from_fn(|j, _| {
+                let (speed, change) = (qd[j], 1.5 * length * self.h * self.first.outcome.qdd[j]);
+                if speed * change >= 0.0 {
+                    speed
+                } else if change.abs() < speed.abs() {
+                    speed + change
+                } else {
+                    0.0
+                }
+            })
+        };
+        let allowed = |ahead: f64| {
+            let speeds = slower(ahead);
+            let most = known.filter(|_| speeds == *qd);
+            let motion = arm.motion_at(speeds);
             let rate = growth::growth(self.model, &motion, memory, &self.modes, (most, yields));
-            let length = (RESOLVED / (rate * self.h)).max(SHORTEST);
-            if length < rest { length } else { rest }
+            (RESOLVED / (rate * self.h)).max(SHORTEST)
         };
-        let first = length(at.1, known);
-        // Slower joints slow down into steeper friction.
-        let slower = Joints::<f64, N>::from_fn(|j, _| {
-            let (speed, change) = (at.1[j], 1.5 * first * self.h * self.first.outcome.qdd[j]);
-            if speed * change >= 0.0 {
-                speed
-            } else if change.abs() < speed.abs() {
-                speed + change
-            } else {
-                0.0
-            }
-        });
-        let length = if slower == *at.1 {
-            first
-        } else {
-            first.min(length(&slower, None))
-        };
-        if length < rest {
-            self.from + length
-        } else {
-            1.0
+        // Not a number is no reason to stop.
+        if !(allowed(rest) < rest) {
+            return 1.0;
         }
+        let now = allowed(0.0).min(rest);
+        self.from + now.min(allowed(now))
     }
 
     /// Makes the step up to a fraction of it, and tells how far the joint that is nearest to a switch is from it; below zero
@@ -177,12 +176,15 @@ impl<const N: usize> Part<'_, N> {
     fn attempt(&self, to: f64, (state, memory): (&mut State<f64, N>, &mut Memory<f64>)) -> f64 {
         *state = self.before;
         memory.state.copy_from_slice(&memory.kept);
-        let fractions = [self.from, 0.5 * (self.from + to), to];
-        let [start, middle, end] = fractions.map(|x| input_at(self.inputs, self.h, x));
-        let inputs = Inputs {
-            start: &start,
-            middle: &middle,
-            end: &end,
+        let whole = self.from == 0.0 && to == 1.0;
+        let parts;
+        let inputs = if whole {
+            *self.inputs
+        } else {
+            let fractions = [self.from, 0.5 * (self.from + to), to];
+            parts = fractions.map(|x| input_at(self.inputs, self.h, x));
+            let [start, middle, end] = &parts;
+            Inputs { start, middle, end }
         };
         let (mut begun, mut last) = (false, self.first);
         let h = (to - self.from) * self.h;
@@ -192,7 +194,7 @@ impl<const N: usize> Part<'_, N> {
             (state, memory),
             |input, q, qd, memory| {
                 if begun {
-                    last = instant::solve(self.model, input, (q, qd), memory, (&self.modes, None));
+                    last = Arm::at(self.model, input, (q, qd)).solve(memory, (&self.modes, None));
                 }
                 begun = true;
                 last.outcome
@@ -203,7 +205,7 @@ impl<const N: usize> Part<'_, N> {
         }
         if matches!(self.model.link, Link::Rigid) {
             let how = (PROJECTIONS, &self.first.held);
-            self.model.project(&end, state, how);
+            self.model.project(inputs.end, state, how);
         }
         self.margin(state, &last)
     }
@@ -270,7 +272,7 @@ fn implicit<const N: usize>(
     [start, end]: [&Input<f64, N>; 2],
     (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
 ) {
-    let (_, now) = modes(model, start, (&state.q, &state.qd), &memory.state, Some(h));
+    let (_, now) = Arm::at(model, start, (&state.q, &state.qd)).modes(&memory.state, Some(h));
     if let Some(jam) = now.jam {
         return stop(start.time, jam, (state, memory));
     }

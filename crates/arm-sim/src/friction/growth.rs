@@ -1,27 +1,14 @@
 //! Joints that run away from rest because their friction falls with speed.
 
 use arm_core::effect::{Motion, States, dry_friction};
-use arm_core::{Joints, Pose};
 
-use super::instant::{Arm, Mode, Modes};
+use super::instant::{Mode, Modes};
 use crate::model::Model;
-use crate::state::Input;
-
-/// How fast each joint gives way to a newton metre in it at an instant, whatever its speed \[rad/(s² N m)\].
-pub(super) fn yielding<const N: usize>(
-    model: &Model<f64, N>,
-    input: &Input<f64, N>,
-    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-) -> [f64; N] {
-    let pose = Pose::new(q);
-    let arm = Arm::at((model, input), (&pose, qd), [0.0; 2]);
-    core::array::from_fn(|j| arm.column(j).0.qdd[j])
-}
 
 /// Fastest rate with which the speed of a joint that slips grows by itself because its friction falls with it \[1/s\].
 ///
 /// * `most` - dry friction at these speeds, where it is known \[N m\]
-/// * `yielding` - see [`yielding`]
+/// * `yielding` - see [`super::instant::Arm::yielding`]
 pub(super) fn growth<const N: usize>(
     model: &Model<f64, N>,
     motion: &Motion<f64, N>,

@@ -81,7 +81,7 @@ pub(crate) fn at<const N: usize>(
     if !model.has_dry {
         return (model.evaluate(input, moving.0, moving.1, memory), None);
     }
-    let (_, solved) = modes(model, input, moving, memory, None);
+    let (_, solved) = Arm::at(model, input, moving).modes(memory, None);
     let friction = Friction {
         torque: solved.dry,
         most: solved.most,
@@ -99,100 +99,6 @@ pub(crate) fn reserve<const N: usize>(solved: &Solved<N>, joint: usize) -> f64 {
     }
 }
 
-/// Finds what friction does in each joint, and what follows.
-///
-/// A joint that moves slips. What joints at rest do is a linear complementarity problem in their accelerations: each sticks
-/// within what holds it, or slips the way in which it is accelerated. With `ahead` \[s\] it is one of all joints, in their
-/// speeds after that time. From all of them sticking, the first that cannot be so changes, until none is left: Murty's
-/// principal pivoting, which ends where the inertia matrix is positive definite.
-pub(crate) fn modes<const N: usize>(
-    model: &Model<f64, N>,
-    input: &Input<f64, N>,
-    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[States<f64>],
-    ahead: Option<f64>,
-) -> (Modes<N>, Solved<N>) {
-    let led = matches!(model.link, Link::Rigid);
-    let rests = |j: usize| qd[j] == 0.0 || (led && qd[j].abs() < LED_STILL);
-    let open: [bool; N] = core::array::from_fn(|j| model.dry[j] && (ahead.is_some() || rests(j)));
-    let mut modes: Modes<N> = core::array::from_fn(|j| match (model.dry[j], open[j]) {
-        (false, _) => Mode::None,
-        (true, true) => Mode::Sticks,
-        (true, false) => Mode::Slips(qd[j].signum()),
-    });
-    let speed = |j: usize| ahead.map_or(0.0, |h| qd[j] / h);
-    let mut solved = solve(model, input, (q, qd), memory, (&modes, ahead));
-    for _ in 0..CHANGES {
-        if solved.jam.is_some() {
-            return (modes, solved);
-        }
-        let other = |j: usize| match modes[j] {
-            Mode::Sticks if !solved.held[j] => {
-                let rate = solved.outcome.qdd[j] + speed(j);
-                let steady = rate.abs() < LED_STEADY;
-                Some(Mode::Slips(if steady { 0.0 } else { rate.signum() }))
-            }
-            Mode::Sticks if reserve(&solved, j) < 0.0 => Some(Mode::Slips(solved.dry[j].signum())),
-            Mode::Slips(way) if way * (solved.outcome.qdd[j] + speed(j)) < 0.0 => {
-                Some(Mode::Sticks)
-            }
-            _ => None,
-        };
-        let Some((joint, mode)) = (0..N)
-            .filter(|&j| open[j])
-            .find_map(|j| other(j).map(|m| (j, m)))
-        else {
-            if model.feels_joint_force {
-                solved.jam = ambiguous(model, input, (q, qd), memory, (&modes, &solved));
-            }
-            return (modes, solved);
-        };
-        modes[joint] = mode;
-        solved = solve(model, input, (q, qd), memory, (&modes, ahead));
-    }
-    // Where friction does not grow with what it does only rounding keeps a mode from being found: either will do.
-    if model.feels_joint_force {
-        solved.jam = (0..N).find(|&j| open[j]).map(|j| (j, f64::INFINITY));
-    }
-    (modes, solved)
-}
-
-/// Joint whose friction may have several answers, and the largest that a newton metre of it can add to it.
-///
-/// With a joint force that is linear in the friction, `λ = ±μ |F₀ + λ f|` has one solution for each sign if `μ |f| < 1`. Beyond
-/// that it has two or none, and whether the joint sticks or slips does not follow from the law (Painlevé 1895).
-fn ambiguous<const N: usize>(
-    model: &Model<f64, N>,
-    input: &Input<f64, N>,
-    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[States<f64>],
-    (modes, solved): (&Modes<N>, &Solved<N>),
-) -> Option<(usize, f64)> {
-    let pose = Pose::new(q);
-    let arm = Arm::at((model, input), (&pose, qd), solved.outcome.force_on_arm);
-    let answer = Answer {
-        qdd: solved.outcome.qdd,
-        force: solved.outcome.force_on_arm,
-    };
-    let through = model.through_joints(&pose, (qd, &answer.qdd), (answer.force, input));
-    let motion = Motion::new(input.time, *q, *qd).with_joint_force(&through);
-    let most = dry_friction(&model.effects, &motion, memory);
-    let gain = |j: usize| {
-        let slope = slope(model, &motion, memory, (j, most[j]));
-        if slope == 0.0 {
-            return 0.0;
-        }
-        let others = core::array::from_fn(|k| k != j && modes[k] == Mode::Sticks);
-        let then = arm.with_less(j, &answer, &others);
-        let [y, z] = [0, 1].map(|axis| then[j][axis] - through[j][axis]);
-        slope * (y * y + z * z).sqrt()
-    };
-    (0..N)
-        .filter(|&j| modes[j] != Mode::None)
-        .map(|j| (j, gain(j)))
-        .find(|(_, gain)| *gain >= 1.0 - SINGLE)
-}
-
 /// What a newton of force through a joint adds to its friction \[m\].
 ///
 /// * `now` - its friction \[N m\]
@@ -208,57 +114,10 @@ fn slope<const N: usize>(
     (dry_friction_of(joint, &model.effects, &beside, memory) - now) / change
 }
 
-/// What follows from state, input and modes.
-///
-/// * `ahead` - time after which joints that stick rest \[s\]; `None` for those that rest already
-pub(crate) fn solve<const N: usize>(
-    model: &Model<f64, N>,
-    input: &Input<f64, N>,
-    (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
-    memory: &[States<f64>],
-    (modes, ahead): (&Modes<N>, Option<f64>),
-) -> Solved<N> {
-    let pose = Pose::new(q);
-    let (force, lost) = model.contact(input, q, qd, &pose);
-    let arm = Arm::at((model, input), (&pose, qd), force);
-    let mut motion = Motion::new(input.time, *q, *qd);
-    let rubbing = Rubbing {
-        modes,
-        wanted: ahead.map_or_else(Joints::zeros, |h| qd / h),
-        memory,
-    };
-    let driving = model.driving(input, &pose);
-    let mut resisting = model.resisting(&motion, memory);
-    let mut found = rubbing.under(&arm, &mut motion, &difference(&driving, &resisting));
-    if model.feels_besides_dry {
-        for _ in 1..model.passes() {
-            resisting = model.resisting(&motion, memory);
-            found = rubbing.under(&arm, &mut motion, &difference(&driving, &resisting));
-        }
-    }
-    let v = match &model.link {
-        Link::Forced(_) => model.tip_velocity(qd, &pose),
-        _ => input.handle.velocity,
-    };
-    let all = sum(&resisting, &found.dry);
-    Solved {
-        outcome: Outcome {
-            qdd: found.answer.qdd,
-            force_on_arm: found.answer.force,
-            power: powers((found.answer.force, v), [&driving, &all], qd, lost),
-            joint_force: motion.joint_force,
-        },
-        dry: found.dry,
-        most: found.most,
-        held: found.held,
-        jam: found.jam,
-    }
-}
-
 /// Accelerations, and the force on the arm that belongs to them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Answer<const N: usize> {
-    pub(super) qdd: Joints<f64, N>,
+struct Answer<const N: usize> {
+    qdd: Joints<f64, N>,
     force: Plane<f64>,
 }
 
@@ -274,14 +133,16 @@ impl<const N: usize> Answer<N> {
     }
 }
 
-/// An arm in one state, which answers any torques.
+/// An arm in one state, which answers any friction and any torques.
 pub(super) struct Arm<'a, const N: usize> {
     model: &'a Model<f64, N>,
     input: &'a Input<f64, N>,
-    pose: &'a Pose<f64, N>,
-    qd: &'a Joints<f64, N>,
-    /// Of a contact that gives way.
-    force: Plane<f64>,
+    /// Without joint forces.
+    motion: Motion<f64, N>,
+    pose: Pose<f64, N>,
+    /// Of a contact that gives way, and the power lost in it.
+    contact: (Plane<f64>, f64),
+    driving: Joints<f64, N>,
     form: Form<N>,
 }
 
@@ -305,37 +166,199 @@ impl<const N: usize> Form<N> {
 impl<'a, const N: usize> Arm<'a, N> {
     #[inline(always)]
     pub(super) fn at(
-        (model, input): (&'a Model<f64, N>, &'a Input<f64, N>),
-        (pose, qd): (&'a Pose<f64, N>, &'a Joints<f64, N>),
-        force: Plane<f64>,
+        model: &'a Model<f64, N>,
+        input: &'a Input<f64, N>,
+        (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
     ) -> Self {
+        let pose = Pose::new(q);
         Self {
             model,
             input,
+            motion: Motion::new(input.time, *q, *qd),
+            contact: model.contact(input, q, qd, &pose),
+            driving: model.driving(input, &pose),
+            form: Form::at(model, &pose, qd),
             pose,
-            qd,
-            force,
-            form: Form::at(model, pose, qd),
         }
+    }
+
+    /// Finds what friction does in each joint, and what follows.
+    ///
+    /// A joint that moves slips. What joints at rest do is a linear complementarity problem in their accelerations: each sticks
+    /// within what holds it, or slips the way in which it is accelerated. With `ahead` \[s\] it is one of all joints, in their
+    /// speeds after that time. From all of them sticking, the first that cannot be so changes, until none is left: Murty's
+    /// principal pivoting, which ends where the inertia matrix is positive definite.
+    pub(super) fn modes(
+        &self,
+        memory: &[States<f64>],
+        ahead: Option<f64>,
+    ) -> (Modes<N>, Solved<N>) {
+        let (model, qd) = (self.model, &self.motion.qd);
+        let led = matches!(model.link, Link::Rigid);
+        let rests = |j: usize| qd[j] == 0.0 || (led && qd[j].abs() < LED_STILL);
+        let open: [bool; N] =
+            core::array::from_fn(|j| model.dry[j] && (ahead.is_some() || rests(j)));
+        let mut modes: Modes<N> = core::array::from_fn(|j| match (model.dry[j], open[j]) {
+            (false, _) => Mode::None,
+            (true, true) => Mode::Sticks,
+            (true, false) => Mode::Slips(qd[j].signum()),
+        });
+        let speed = |j: usize| ahead.map_or(0.0, |h| qd[j] / h);
+        let mut solved = self.solve(memory, (&modes, ahead));
+        for _ in 0..CHANGES {
+            if solved.jam.is_some() {
+                return (modes, solved);
+            }
+            let other = |j: usize| match modes[j] {
+                Mode::Sticks if !solved.held[j] => {
+                    let rate = solved.outcome.qdd[j] + speed(j);
+                    let steady = rate.abs() < LED_STEADY;
+                    Some(Mode::Slips(if steady { 0.0 } else { rate.signum() }))
+                }
+                Mode::Sticks if reserve(&solved, j) < 0.0 => {
+                    Some(Mode::Slips(solved.dry[j].signum()))
+                }
+                Mode::Slips(way) if way * (solved.outcome.qdd[j] + speed(j)) < 0.0 => {
+                    Some(Mode::Sticks)
+                }
+                _ => None,
+            };
+            let Some((joint, mode)) = (0..N)
+                .filter(|&j| open[j])
+                .find_map(|j| other(j).map(|m| (j, m)))
+            else {
+                if model.feels_joint_force {
+                    solved.jam = self.ambiguous(memory, (&modes, &solved));
+                }
+                return (modes, solved);
+            };
+            modes[joint] = mode;
+            solved = self.solve(memory, (&modes, ahead));
+        }
+        // Where friction does not grow with what it does only rounding keeps a mode from being found: either will do.
+        if model.feels_joint_force {
+            solved.jam = (0..N).find(|&j| open[j]).map(|j| (j, f64::INFINITY));
+        }
+        (modes, solved)
+    }
+
+    /// Joint whose friction may have several answers, and the largest that a newton metre of it can add to it.
+    ///
+    /// With a joint force that is linear in the friction, `λ = ±μ |F₀ + λ f|` has one solution for each sign if `μ |f| < 1`. Beyond
+    /// that it has two or none, and whether the joint sticks or slips does not follow from the law (Painlevé 1895).
+    fn ambiguous(
+        &self,
+        memory: &[States<f64>],
+        (modes, solved): (&Modes<N>, &Solved<N>),
+    ) -> Option<(usize, f64)> {
+        let model = self.model;
+        let answer = Answer {
+            qdd: solved.outcome.qdd,
+            force: solved.outcome.force_on_arm,
+        };
+        let through = self.through_joints(&answer);
+        let motion = self.motion.with_joint_force(&through);
+        let most = dry_friction(&model.effects, &motion, memory);
+        let gain = |j: usize| {
+            let slope = slope(model, &motion, memory, (j, most[j]));
+            if slope == 0.0 {
+                return 0.0;
+            }
+            let others = core::array::from_fn(|k| k != j && modes[k] == Mode::Sticks);
+            let then = self.with_less(j, &answer, &others);
+            let [y, z] = [0, 1].map(|axis| then[j][axis] - through[j][axis]);
+            slope * (y * y + z * z).sqrt()
+        };
+        (0..N)
+            .filter(|&j| modes[j] != Mode::None)
+            .map(|j| (j, gain(j)))
+            .find(|(_, gain)| *gain >= 1.0 - SINGLE)
+    }
+
+    /// What follows from modes.
+    ///
+    /// * `ahead` - time after which joints that stick rest \[s\]; `None` for those that rest already
+    #[inline(always)]
+    pub(super) fn solve(
+        &self,
+        memory: &[States<f64>],
+        (modes, ahead): (&Modes<N>, Option<f64>),
+    ) -> Solved<N> {
+        let (model, qd) = (self.model, &self.motion.qd);
+        let mut motion = self.motion;
+        let rubbing = Rubbing {
+            modes,
+            wanted: ahead.map_or_else(Joints::zeros, |h| qd / h),
+            memory,
+        };
+        let driving = &self.driving;
+        let mut resisting = model.resisting(&motion, memory);
+        let mut found = rubbing.under(self, &mut motion, &difference(driving, &resisting));
+        if model.feels_besides_dry {
+            for _ in 1..model.passes() {
+                resisting = model.resisting(&motion, memory);
+                found = rubbing.under(self, &mut motion, &difference(driving, &resisting));
+            }
+        }
+        let v = match &model.link {
+            Link::Forced(_) => model.tip_velocity(qd, &self.pose),
+            _ => self.input.handle.velocity,
+        };
+        let all = sum(&resisting, &found.dry);
+        let lost = self.contact.1;
+        Solved {
+            outcome: Outcome {
+                qdd: found.answer.qdd,
+                force_on_arm: found.answer.force,
+                power: powers((found.answer.force, v), [driving, &all], qd, lost),
+                joint_force: motion.joint_force,
+            },
+            dry: found.dry,
+            most: found.most,
+            held: found.held,
+            jam: found.jam,
+        }
+    }
+
+    /// The same motion with other speeds.
+    pub(super) fn motion_at(&self, speeds: Joints<f64, N>) -> Motion<f64, N> {
+        Motion {
+            qd: speeds,
+            ..self.motion
+        }
+    }
+
+    /// How fast each joint gives way to a newton metre in it, whatever its speed \[rad/(s² N m)\].
+    pub(super) fn yielding(&self) -> [f64; N] {
+        core::array::from_fn(|j| self.column(j).0.qdd[j])
+    }
+
+    /// Forces through the joints \[N\].
+    fn through_joints(&self, answer: &Answer<N>) -> [Plane<f64>; N] {
+        let moving = (&self.motion.qd, &answer.qdd);
+        self.model
+            .through_joints(&self.pose, moving, (answer.force, self.input))
     }
 
     #[inline(always)]
     fn under(&self, torque: &Joints<f64, N>) -> Answer<N> {
         let (qdd, force) = match &self.form {
             Form::Links(resistance) => {
-                let load = self.model.load(self.pose, torque, self.force);
-                let qdd = resistance.accelerations(&self.model.products, self.pose, &load);
-                (qdd, self.force)
+                let force = self.contact.0;
+                let load = self.model.load(&self.pose, torque, force);
+                let qdd = resistance.accelerations(&self.model.products, &self.pose, &load);
+                (qdd, force)
             }
-            Form::Joints(terms, _) => self
-                .model
-                .accelerations(self.input, torque, self.force, terms),
+            Form::Joints(terms, _) => {
+                self.model
+                    .accelerations(self.input, torque, self.contact.0, terms)
+            }
         };
         Answer { qdd, force }
     }
 
     /// What one newton metre in a joint adds, and what it would give way by if nothing held the tip.
-    pub(super) fn column(&self, joint: usize) -> (Answer<N>, f64) {
+    fn column(&self, joint: usize) -> (Answer<N>, f64) {
         let (free, constraint) = match &self.form {
             Form::Links(resistance) => (resistance.column(joint), None),
             Form::Joints(terms, constraint) => {
@@ -365,8 +388,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         self.hold(&mut column, sticks, &Joints::zeros());
         let mut less = *answer;
         less.less(1.0, &column);
-        self.model
-            .through_joints(self.pose, (self.qd, &less.qdd), (less.force, self.input))
+        self.through_joints(&less)
     }
 
     /// Takes from an answer what joints that stick do, so that these have the accelerations wanted of them.
@@ -508,8 +530,7 @@ impl<const N: usize> Rubbing<'_, N> {
             if settled {
                 return found(most, jam);
             }
-            let moving = (arm.qd, &answer.qdd);
-            let through = model.through_joints(arm.pose, moving, (answer.force, arm.input));
+            let through = arm.through_joints(&answer);
             *motion = motion.with_joint_force(&through);
             most = dry_friction(&model.effects, motion, self.memory);
             let missing = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j] - slips[j]);
