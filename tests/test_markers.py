@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -251,6 +253,20 @@ def test_a_damaged_c3d_neither_crashes_nor_hangs(data: Path, name: str, monkeypa
     monkeypatch.setattr(apart, "LONGEST", 5.0)
     with pytest.raises(armrs.BadInput, match="a whole C3D file"):
         armrs.read_markers(data / "hostile" / name)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no processor time")
+def test_a_reader_that_waits_for_its_turn_is_not_taken_for_one_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from armrs.io import apart
+
+    (tmp_path / "late_reader.py").write_text(
+        "import time\nfrom armrs.io import apart\n\ntime.sleep(3)\napart.serve(lambda path: {'size': path.stat().st_size})\n"
+    )
+    (tmp_path / "data.bin").write_bytes(b"abc")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setattr(apart, "LONGEST", 2.0)
+    with apart.content("late_reader", tmp_path / "data.bin", "anything") as arrays:
+        assert arrays["size"] == 3
 
 
 def test_a_first_point_that_moves_is_said_and_its_path_comes_back() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
+import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +18,16 @@ from ..errors import BadInput, Text
 from . import files
 
 LONGEST = 60.0
-"""Time that reading a file may take [s]; 100 MB take about 2 s."""
+"""Processor time that reading a file may take [s], or time on the clock where the system limits none; 100 MB take about 2 s."""
+_WAIT = 10.0
+"""How many times as long it may take on the clock: on a busy machine a reader that works waits for its turn."""
 _MEMORY_PER_BYTE = 60
 """Memory the reader may take for each byte of the file; whole files took up to 20."""
 _MEMORY = 2 << 30
 """Memory it may take whatever the file is [bytes]: address space, of which the libraries reserve most."""
 
 
-@contextmanager
+@contextlib.contextmanager
 def content(module: str, path: Path, allowed: str) -> Iterator[Any]:
     """Give the arrays that a module of armrs reads from a file when it is run with the file and an NPZ file to write.
 
@@ -35,10 +39,13 @@ def content(module: str, path: Path, allowed: str) -> Iterator[Any]:
     with tempfile.TemporaryDirectory(prefix=files.scratch_prefix("read")) as folder:
         out = Path(folder) / "content.npz"
         command = [sys.executable, "-m", module, str(path.resolve()), str(out)]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False, preexec_fn=_limits(path))
-        except subprocess.TimeoutExpired:
-            raise BadInput("file", Text(f"a content that keeps the reader busy for more than {LONGEST:g} s"), allowed) from None
+        limits = _limits(path)
+        wait = LONGEST * (_WAIT if limits else 1.0)
+        done = None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            done = subprocess.run(command, capture_output=True, text=True, timeout=wait, check=False, preexec_fn=limits)
+        if done is None or (limits and done.returncode == -signal.SIGXCPU):
+            raise BadInput("file", Text(f"a content that keeps the reader busy for more than {LONGEST:g} s"), allowed)
         if done.returncode != 0 or not out.is_file():
             said = done.stderr.strip().splitlines()
             found = said[-1] if done.returncode == 1 and said else "a content that the reader does not survive"
@@ -56,10 +63,17 @@ def serve(read: Callable[[Path], dict[str, Any]]) -> None:
 
 
 def _limits(path: Path) -> Callable[[], None] | None:
-    """Return what limits the memory of the reader, where the system can."""
-    if sys.platform != "linux":
+    """Return what limits the processor time and the memory of the reader, where the system can."""
+    if sys.platform == "win32":
         return None
     import resource
 
-    most = _MEMORY + _MEMORY_PER_BYTE * path.stat().st_size
-    return lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    most, seconds = _MEMORY + _MEMORY_PER_BYTE * path.stat().st_size, math.ceil(LONGEST)
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+        # Elsewhere the libraries may reserve any amount.
+        if sys.platform == "linux":
+            resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+    return limit
