@@ -225,6 +225,9 @@ def test_names_are_counted_one_by_one(score: ModuleType) -> None:
     assert line["names"]["found"] == ["elastic 1"]
     # The viscosity is less than twice what would have been seen; the spring that was not named is more.
     assert line["detectable"] == ["elastic 1", "elastic 2"]
+    # Of a joint that is held nothing would have been seen.
+    said["would_have_seen"] = [{"kind": "viscous", "joint": 2, "at_least": None}, {"kind": "elastic", "joint": 2, "at_least": None}]
+    assert score.judge(little_known(), said)["detectable"] == ["elastic 1"]
 
 
 def test_a_name_that_is_not_decided_asks_whether_the_true_one_is_stated(score: ModuleType) -> None:

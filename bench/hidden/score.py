@@ -134,10 +134,14 @@ def errors(truth: Json, named: Json) -> dict[str, float]:
 
 
 def detectable(truth: Json, limits: list[Json]) -> bool:
-    """Whether an effect is twice as large as what the answer says that it would have seen; where it says nothing it is."""
+    """Whether an effect is twice as large as what the answer says that it would have seen; where it says nothing it is.
+
+    Of an effect that the answer says it would have seen at no size (`at_least` is null) none is large enough.
+    """
     size = max((abs(p["value"]) for name, p in truth["parameters"].items() if name not in SHAPES), default=math.inf)
-    least = [limit["at_least"] for limit in limits if same(truth, limit) and limit.get("at_least") is not None]
-    return all(size >= SEEN * limit for limit in least)
+    least = [limit["at_least"] for limit in limits if same(truth, limit)]
+    seen = [limit for limit in least if limit is not None]
+    return bool(seen or not least) and all(size >= SEEN * limit for limit in seen)
 
 
 def left_open(answer: Json) -> list[str]:

@@ -899,7 +899,7 @@ class Limit:
         joint: int | None,
         channel: str | None,
         parameter: str,
-        at_least: float,
+        at_least: float | None,
         unit: str,
         gain: float = ...,
         price: float = ...,
@@ -913,7 +913,7 @@ class Limit:
     @property
     def parameter(self) -> str: ...
     @property
-    def at_least(self) -> float: ...
+    def at_least(self) -> float | None: ...
     @property
     def unit(self) -> str: ...
     @property

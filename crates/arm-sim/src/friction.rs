@@ -163,8 +163,9 @@ impl<const N: usize> Part<'_, N> {
             let rate = growth::growth(self.model, &motion, memory, &self.modes, (most, yields));
             (RESOLVED / (rate * self.h)).max(SHORTEST)
         };
-        // Not a number is no reason to stop.
-        if !(allowed(rest) < rest) {
+        let least = allowed(rest);
+        // Not a number is no reason for parts.
+        if least >= rest || least.is_nan() {
             return 1.0;
         }
         let now = allowed(0.0).min(rest);

@@ -429,6 +429,6 @@ def smallest_effects(would_show: Sequence[Mapping[str, Any]]) -> Table:
         key = (w["kind"], w["parameter"], w["unit"])
         cells = rows.setdefault(key, [None] * (most + 2))
         at = w["joint"] - 1 if w["joint"] else most + ({"Fy": 0, "Fz": 1}.get(w["channel"], 0) if w["channel"] else 0)
-        cells[at] = digits(w["at_least"], 2)
+        cells[at] = "no size" if w["at_least"] is None else digits(w["at_least"], 2)
     head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole arm or Fy", "Fz"]
     return Table(head, [[kind, parameter, unit(held_in), *cells] for (kind, parameter, held_in), cells in rows.items()], 3)

@@ -237,6 +237,12 @@ impl<const N: usize> Session<N> {
         passive.free.clear();
     }
 
+    /// Laws of joints that are held, which no data can tell.
+    pub fn hidden_laws(&self) -> Vec<Effect<f64>> {
+        let hidden = self.base.iter().filter(|law| law.free.is_empty());
+        hidden.map(|law| law.effect).collect()
+    }
+
     /// Joints that move and are held all the same, from 0: what resists them is far above any viscosity.
     pub fn held_in_motion(&self) -> Vec<usize> {
         let held = |law: &&Passive| law.likely && law.free.is_empty();

@@ -131,7 +131,7 @@ impl GapResult {
             verdict,
             places: Vec::new(),
             gap,
-            would_have_seen: limits(&finding.ruled, &named),
+            would_have_seen: limits(&finding.ruled, &named, &prepared.session.hidden_laws()),
             unexplained: if verdict == Verdict::Unexplained || !effects.is_empty() {
                 at_most(share, 1.0)
             } else {

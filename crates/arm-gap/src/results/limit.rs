@@ -1,3 +1,4 @@
+use arm_core::effect::Effect;
 use serde::Serialize;
 
 use super::{Named, placed};
@@ -16,8 +17,8 @@ pub struct Limit {
     pub channel: Option<String>,
     /// The parameter that is its size.
     pub parameter: String,
-    /// Smallest size of the parameter that would have been named.
-    pub at_least: f64,
+    /// Smallest size of the parameter that would have been named; `None` where these data show no size of it.
+    pub at_least: Option<f64>,
     /// Unit of the parameter.
     pub unit: String,
     /// What it would still explain, in units of twice the log-likelihood.
@@ -28,50 +29,71 @@ pub struct Limit {
 
 /// The limits of all candidates that were ruled out, one for each size, but for the effects that were named. Of several shapes of an effect that counts which
 /// shows most clearly, and the most that any of them explains.
+///
+/// * `hidden` - laws of joints that friction holds, which no data of a joint at rest can show
 pub(super) fn limits(
     ruled: &[Ruled],
     named: &[(String, Option<usize>, Option<String>)],
+    hidden: &[Effect<f64>],
 ) -> Vec<Limit> {
     let mut all: Vec<Limit> = Vec::new();
     for one in ruled {
-        let effect = &one.effect;
-        let place = placed(effect.kind, effect.index);
-        if named.contains(&place) {
+        if named.contains(&placed(one.effect.kind, one.effect.index)) {
             continue;
         }
-        let sizes = std::iter::zip(&one.free, &one.smallest);
-        for (&free, &smallest) in sizes.filter(|(_, smallest)| smallest.is_finite()) {
-            add(&mut all, one, (free, smallest));
+        for (&free, &smallest) in std::iter::zip(&one.free, &one.smallest) {
+            let at_least = smallest.is_finite().then_some(smallest);
+            add(
+                &mut all,
+                Limit::new(&one.effect, free, (at_least, one.gain, one.price)),
+            );
         }
+    }
+    for law in hidden {
+        add(&mut all, Limit::new(law, 0, (None, 0.0, 0.0)));
     }
     all
 }
 
-/// Adds the smallest value of a free parameter that would have been named.
-fn add(all: &mut Vec<Limit>, one: &Ruled, (free, smallest): (usize, f64)) {
-    let effect = &one.effect;
-    let parameter = &effect.kind.info().parameters[free];
-    let (kind, joint, channel) = placed(effect.kind, effect.index);
-    let same = |l: &&mut Limit| {
-        (&l.kind, l.joint, &l.channel) == (&kind, joint, &channel) && l.parameter == parameter.name
-    };
-    if let Some(known) = all.iter_mut().find(same) {
-        if known.gain - known.price <= one.gain - one.price {
-            (known.gain, known.price) = (one.gain, one.price);
+impl Limit {
+    fn new(
+        effect: &Effect<f64>,
+        free: usize,
+        (at_least, gain, price): (Option<f64>, f64, f64),
+    ) -> Self {
+        let parameter = &effect.kind.info().parameters[free];
+        let (kind, joint, channel) = placed(effect.kind, effect.index);
+        Self {
+            kind,
+            joint,
+            channel,
+            parameter: parameter.name.to_owned(),
+            at_least,
+            unit: parameter.unit.to_owned(),
+            gain,
+            price,
         }
-        known.at_least = known.at_least.min(smallest);
-        return;
     }
-    all.push(Limit {
-        kind,
-        joint,
-        channel,
-        parameter: parameter.name.to_owned(),
-        at_least: smallest,
-        unit: parameter.unit.to_owned(),
-        gain: one.gain,
-        price: one.price,
-    });
+
+    fn is_of(&self, other: &Self) -> bool {
+        (&self.kind, self.joint, &self.channel, &self.parameter)
+            == (&other.kind, other.joint, &other.channel, &other.parameter)
+    }
+}
+
+/// Adds the smallest value of a free parameter that would have been named.
+fn add(all: &mut Vec<Limit>, new: Limit) {
+    let Some(known) = all.iter_mut().find(|l| l.is_of(&new)) else {
+        all.push(new);
+        return;
+    };
+    if known.gain - known.price <= new.gain - new.price {
+        (known.gain, known.price) = (new.gain, new.price);
+    }
+    known.at_least = match (known.at_least, new.at_least) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    };
 }
 
 /// An effect alone, to first order.
@@ -151,7 +173,7 @@ impl SearchStep {
 
 #[cfg(test)]
 mod tests {
-    use arm_core::effect::{Effect, Kind};
+    use arm_core::effect::Kind;
 
     use super::*;
 
@@ -174,12 +196,12 @@ mod tests {
         play.smallest = vec![2e-5, 3e-3];
         let mut along_y = ruled("backlash", 0, (4.0, 20.0, 1e-5));
         along_y.smallest = vec![1e-5];
-        let limits = limits(&[play, along_y], &[]);
+        let limits = limits(&[play, along_y], &[], &[]);
         let told: Vec<_> = limits
             .iter()
             .map(|l| (l.parameter.as_str(), l.at_least))
             .collect();
-        assert_eq!(told, [("y", 1e-5), ("z", 3e-3)]);
+        assert_eq!(told, [("y", Some(1e-5)), ("z", Some(3e-3))]);
     }
 
     #[test]
@@ -188,21 +210,37 @@ mod tests {
             ruled("coulomb", 0, (3.0, 20.0, 0.05)),
             ruled("coulomb", 0, (8.0, 20.0, 0.04)),
             ruled("coulomb", 0, (5.0, 20.0, 0.03)),
-            // Not seen at any size, and named.
+            // Not seen at any size; and named.
             ruled("viscous", 0, (0.0, 20.0, f64::INFINITY)),
             ruled("viscous", 1, (90.0, 20.0, 0.02)),
             ruled("force_bias", 1, (1.0, 20.0, 0.3)),
         ];
         let named = [("viscous".to_owned(), Some(2), None)];
-        let limits = limits(&all, &named);
+        let limits = limits(&all, &named, &[]);
         let told: Vec<_> = limits.iter().map(|l| (l.kind.as_str(), l.joint)).collect();
-        assert_eq!(told, [("coulomb", Some(1)), ("force_bias", None)]);
+        let (coulomb, viscous) = (("coulomb", Some(1)), ("viscous", Some(1)));
+        assert_eq!(told, [coulomb, viscous, ("force_bias", None)]);
         let dry = &limits[0];
-        assert_eq!((dry.gain, dry.price, dry.at_least), (8.0, 20.0, 0.03));
+        assert_eq!((dry.gain, dry.price, dry.at_least), (8.0, 20.0, Some(0.03)));
         assert_eq!(
             (dry.parameter.as_str(), dry.unit.as_str()),
             ("torque", "N m")
         );
-        assert_eq!(limits[1].channel.as_deref(), Some("Fz"));
+        assert_eq!(limits[1].at_least, None);
+        assert_eq!(limits[2].channel.as_deref(), Some("Fz"));
+    }
+
+    #[test]
+    fn a_law_of_a_joint_that_friction_holds_is_seen_at_no_size() {
+        let spring = Effect::new(Kind::Elastic, 2);
+        let limits = limits(&[ruled("viscous", 0, (1.0, 20.0, 0.1))], &[], &[spring]);
+        let told: Vec<_> = limits
+            .iter()
+            .map(|l| (l.kind.as_str(), l.joint, l.at_least))
+            .collect();
+        assert_eq!(
+            told,
+            [("viscous", Some(1), Some(0.1)), ("elastic", Some(3), None)]
+        );
     }
 }

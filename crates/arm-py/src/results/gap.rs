@@ -216,8 +216,8 @@ result_class! {
         channel: Option<String>, "";
         /// The parameter that is its size.
         parameter: String, "";
-        /// Smallest size of the parameter that would have been named, in `unit`.
-        at_least: f64, "";
+        /// Smallest size of the parameter that would have been named, in `unit`; `None` where the data show no size of it.
+        at_least: Option<f64>, "";
         /// SI unit of the parameter.
         unit: String, "";
         /// What it would still explain, in units of twice the log-likelihood.
