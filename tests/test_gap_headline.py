@@ -30,6 +30,7 @@ def result(verdict: str, *effects: dict[str, Any], z: float | None = 0.5, **more
         "data": {"joints": ["shoulder", "elbow", "wrist"]},
         "lack_of_fit": {"calibrated": {"ratio": 3.0, "z": 20.0}, "amended": {"ratio": 1.0, "z": z}},
         "unexplained": {"share": 0.0, "looks_like": None},
+        "would_have_seen": [],
         **more,
     }
 
@@ -82,6 +83,20 @@ def test_what_the_result_calls_open_counts_with_its_place() -> None:
     assert "and something that the catalogue has no name for" in headline(told)
     # What it calls closed is closed, whatever the ratio: its test knows what the floor is uncertain by.
     assert still_open(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.3, 0.15)}, open=[])) == []
+
+
+def test_a_joint_that_friction_holds_is_no_riddle() -> None:
+    """Its angle was said to lack something that the catalogue has no name for, above a warning that friction holds it."""
+    hidden = [{"kind": kind, "joint": 3, "at_least": None, "price": 0.0} for kind in ("elastic", "viscous", "coulomb")]
+    q3 = {"channel": "q3_rad", "trial": "trials/reach_5.csv", "start_s": 1.0, "end_s": 8.9}
+    told = headline(result("unexplained", DRY, open=[q3], would_have_seen=hidden))
+    assert (
+        ", and the laws in joint 3 (wrist), which friction holds nearly all the time, so that these movements cannot tell them: on held-out"
+        in told
+    )
+    # A force is open beside it, or nothing holds the joint.
+    for seen, opened in ((hidden, [q3, q3 | {"channel": "Fz_N"}]), ([], [q3])):
+        assert "no name for" in headline(result("unexplained", DRY, open=opened, would_have_seen=seen))
 
 
 def test_what_is_not_decided_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:

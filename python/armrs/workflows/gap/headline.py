@@ -82,12 +82,23 @@ def headline(result: Mapping[str, Any]) -> str:
         return f"Nothing is missing: on held-out trials every channel is off by {_near(result['gap'])}what repeats differ by."
     if effects:
         lacks = f"The model lacks {_names(effects, joints)}"
-        lacks += ", and something that the catalogue has no name for" if unexplained else ", and that is not all" if opened else ""
+        lacks += f", and {_beyond(result, opened)}" if unexplained else ", and that is not all" if opened else ""
     else:
         lacks = "Something is missing that the catalogue has no name for" if unexplained else "No effect of the catalogue was found"
         lacks += "" if unexplained else ", yet something is missing"
     said = _gap(result, opened)
     return f"{lacks}{': ' if said else ''}{said}."
+
+
+def _beyond(result: Mapping[str, Any], opened: Sequence[str]) -> str:
+    """Return what is missing beyond the names: nothing nameable, or the laws of the only joints that are open, which friction holds."""
+    held = {w["joint"] for w in result["would_have_seen"] if w["at_least"] is None and not w["price"]}
+    stuck = sorted(j for j in held if j and any(name.startswith(f"q{j}_") for name in opened))
+    if not stuck or len(stuck) < len(opened):
+        return "something that the catalogue has no name for"
+    one = place_of("the laws", stuck[0], None, result["data"]["joints"])
+    where = one if len(stuck) == 1 else f"the laws in joints {joined([str(j) for j in stuck])}"
+    return f"{where}, which friction holds nearly all the time, so that these movements cannot tell them"
 
 
 def _near(gap: Mapping[str, Mapping[str, Any]]) -> str:
