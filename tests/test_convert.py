@@ -97,6 +97,16 @@ def test_a_fault_in_the_last_trial_writes_nothing(session: Session, tmp_path: Pa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("name", [".", "..", "/", "trials/.."])
+def test_a_trial_without_a_file_name_is_refused(session: Session, tmp_path: Path, name: str) -> None:
+    """`.` ended in a traceback: a folder has no suffix that could be changed."""
+    description = session.folder / "dataset.toml"
+    description.write_text(description.read_text(encoding="utf-8").replace("trials/slow_1.csv", name), encoding="utf-8")
+    with pytest.raises(BadInput, match=rf"\[\[trial\]\] 1, file: found '{name}', allowed the name of a file"):
+        armrs.convert(session.folder, tmp_path / "out", to="parquet")
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [

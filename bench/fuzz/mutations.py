@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -158,7 +159,8 @@ def member(random: Random, data: bytes) -> bytes:
     else:
         entries[at] = (name, random.choice(TEXT if name.endswith((".xml", ".json", ".txt")) else BINARY)(random, content))
     target = BytesIO()
-    with zipfile.ZipFile(target, "w") as archive:
+    with warnings.catch_warnings(), zipfile.ZipFile(target, "w") as archive:
+        warnings.simplefilter("ignore")  # two files of one name are meant
         for name, content in entries:
             archive.writestr(zipfile.ZipInfo(name or "x"), content, random.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)))
     return target.getvalue()

@@ -376,8 +376,10 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
 def output_names(names: list[str], suffix: str | None) -> list[str]:
     """Return where below an output folder trials go: under their own names when these stay inside, else in `trials/`."""
     result: list[str] = []
-    for name in names:
+    for number, name in enumerate(names, 1):
         path = Path(name)
+        if path.name in ("", ".."):
+            raise BadInput(f"[[trial]] {number}, file", name, "the name of a file")
         inside = not path.is_absolute() and ".." not in path.parts
         path = path if inside else Path("trials") / path.name
         path = path.with_suffix(suffix) if suffix else path
