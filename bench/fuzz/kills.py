@@ -183,13 +183,13 @@ def said(place: Path) -> str:
     return printed.read_text(encoding="utf-8", errors="replace").strip() if printed.exists() else ""
 
 
-def killed(verb: Verb, expected: Usual, folder: Path, place: Path, share: float, draws: bool) -> list[str]:
-    """Kill a verb after a share of the time it takes, call it again; return what is wrong."""
+def killed(verb: Verb, expected: Usual, folder: Path, place: Path, share: float, draws: bool) -> tuple[bool, list[str]]:
+    """Kill a verb after a share of the time it takes, call it again; return whether it was still at work, and what is wrong."""
     fresh(verb, folder, place)
     process = start(verb, place, draws)
     time.sleep(share * expected.seconds)
     kill(process)
-    wrong = []
+    working, wrong = process.exitcode == -signal.SIGKILL, []
     history = place / "OUT" / "history.sqlite"
     reported = "history" in said(place).lower() and process.exitcode == expected.status
     if "--history" in verb.arguments and reported and sessions(history) < 1:
@@ -198,7 +198,7 @@ def killed(verb: Verb, expected: Usual, folder: Path, place: Path, share: float,
     again.join(max(PATIENCE, 20.0 * expected.seconds))
     if again.exitcode is None:
         kill(again)
-        return [*wrong, "the next call does not end"]
+        return working, [*wrong, "the next call does not end"]
     if again.exitcode != expected.status:
         wrong.append(f"the next call: status {again.exitcode}: {said(place)[-200:]}")
     found = content(place, verb.varies)
@@ -211,7 +211,7 @@ def killed(verb: Verb, expected: Usual, folder: Path, place: Path, share: float,
     if left:
         wrong.append(f"left in the temporary folder: {left[:3]}")
         shutil.rmtree(place.parent / "tmp")
-    return wrong
+    return working, wrong
 
 
 def main() -> int:
@@ -222,7 +222,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="verbs whose command holds this text")
     asked = parser.parse_args()
-    random, bad, count = Random(asked.seed), 0, 0
+    random, bad, count, early = Random(asked.seed), 0, 0, 0
     os.environ["SOURCE_DATE_EPOCH"] = "0"
     with tempfile.TemporaryDirectory(prefix="kills-") as name:
         folder, place = Path(name) / "seeds", Path(name) / "home" / "work"
@@ -245,14 +245,14 @@ def main() -> int:
                 if usual(verb, folder, place, draws).files != expected[verb, draws].files:
                     print(f"armrs {' '.join(verb.arguments)}: two undisturbed runs differ", flush=True)
             share = random.uniform(0.0, 1.1)
-            wrong = killed(verb, expected[verb, draws], folder, place, share, draws)
-            count += 1
+            working, wrong = killed(verb, expected[verb, draws], folder, place, share, draws)
+            count, early = count + 1, early + working
             if count % 50 == 0:
-                print(f"{count} kills, {bad} wrong", flush=True)
+                print(f"{count} kills, {early} before the end, {bad} wrong", flush=True)
             if wrong:
                 bad += 1
                 print(f"armrs {' '.join(verb.arguments)}, killed after {share:.2f} of its time: {'; '.join(wrong)}", flush=True)
-    print(f"{count} kills over {len(verbs)} commands: {bad} wrong")
+    print(f"{count} kills over {len(verbs)} commands, {early} before the end: {bad} wrong")
     return 1 if bad else 0
 
 
