@@ -65,12 +65,12 @@
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_estimator`.
-#define ARMRS_ESTIMATOR_WORDS 1504
+#define ARMRS_ESTIMATOR_WORDS 1850
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_estimator`.
-#define ARMRS_ESTIMATOR_WORDS 736
+#define ARMRS_ESTIMATOR_WORDS 910
 #endif
 
 // Size of an `armrs_monitor`.

@@ -321,8 +321,8 @@ pub unsafe extern "C" fn armrs_kinematics(
             Pose::new(&joints(&finite(*q)?)),
         );
         let position = finite(tip(chain, &pose))?;
-        let found = jacobian(chain, &pose);
-        let derivative = [0, 1].map(|row| core::array::from_fn(|j| found[(row, j)]));
+        let columns: [[armrs_real; 2]; ARMRS_JOINTS] = jacobian(chain, &pose).into();
+        let derivative = [columns.map(|[y, _]| y), columns.map(|[_, z]| z)];
         for row in derivative {
             finite(row)?;
         }

@@ -156,10 +156,10 @@ pub struct armrs_estimator {
 
 /// Size of an `armrs_estimator`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_ESTIMATOR_WORDS: usize = 1504;
+pub const ARMRS_ESTIMATOR_WORDS: usize = 1850;
 /// Size of an `armrs_estimator`.
 #[cfg(feature = "single")]
-pub const ARMRS_ESTIMATOR_WORDS: usize = 736;
+pub const ARMRS_ESTIMATOR_WORDS: usize = 910;
 
 type Core = Estimator<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 

@@ -2,6 +2,7 @@
 
 use core::array::from_fn;
 
+use crate::covariance::Covariance;
 use crate::effect::{Motion, States};
 use crate::equation::{Equation, Needed};
 use crate::scalar::Real;
@@ -23,8 +24,7 @@ pub struct GravityCompensation<T, const N: usize> {
 pub struct Compensation<T, const N: usize, const P: usize, const E: usize> {
     equation: Equation<T, N, P, E>,
     values: [T; P],
-    /// Lower triangular square root of the covariance.
-    root: [[T; P]; P],
+    covariance: Covariance<T, P>,
 }
 
 impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N, P, E> {
@@ -41,34 +41,16 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
         values: [T; P],
         covariance: &[[T; P]; P],
     ) -> Result<Self, Invalid> {
-        let mut root = [[T::ZERO; P]; P];
         for i in 0..P {
             check::finite("value of unknown", i, values[i])?;
-            for k in 0..=i {
-                let mut value = covariance[i][k];
+            for &value in &covariance[i][..=i] {
                 check::finite("covariance of unknown", i, value)?;
-                for m in 0..k {
-                    value -= root[i][m] * root[k][m];
-                }
-                if i != k {
-                    let pivot = root[k][k];
-                    root[i][k] = if pivot > T::ZERO {
-                        value / pivot
-                    } else {
-                        T::ZERO
-                    };
-                    continue;
-                }
-                // Rounding may leave a little less than nothing of a variance that others explain.
-                let rounding = covariance[i][i] * T::of(ROUNDING);
-                check::at_least_zero("variance of unknown", i, value + rounding)?;
-                root[i][i] = value.max(T::ZERO).sqrt();
             }
         }
         Ok(Self {
             equation,
             values,
-            root,
+            covariance: factorised(covariance)?,
         })
     }
 
@@ -84,23 +66,39 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
     ) -> GravityCompensation<T, N> {
         let mut rows = Needed::none();
         self.equation.add_carrying(motion, memory, &mut rows);
-        let deviation = |row: &[T; P]| {
-            let mut sum = T::ZERO;
-            for k in 0..P {
-                let mut value = T::ZERO;
-                for i in k..P {
-                    value += self.root[i][k] * row[i];
-                }
-                sum += value.squared();
-            }
-            sum.sqrt()
-        };
         GravityCompensation {
             within: true,
             torque: rows.torque(&self.values),
-            sd: joints(from_fn(|j| deviation(&rows.columns[j]))),
+            sd: joints(from_fn(|j| self.covariance.deviation(&rows.columns[j]))),
         }
     }
+}
+
+/// The root of a covariance, from the last unknown to the first.
+fn factorised<T: Real, const P: usize>(
+    covariance: &[[T; P]; P],
+) -> Result<Covariance<T, P>, Invalid> {
+    let Covariance {
+        mut rows,
+        mut variances,
+    } = Covariance::independent([T::ZERO; P]);
+    for k in (0..P).rev() {
+        for i in (0..=k).rev() {
+            let mut value = covariance[k][i];
+            for m in k + 1..P {
+                value -= rows[i][m] * rows[k][m] * variances[m];
+            }
+            if i == k {
+                // Rounding may leave a little less than nothing of a variance that others explain.
+                let rounding = covariance[k][k] * T::of(ROUNDING);
+                check::at_least_zero("variance of unknown", k, value + rounding)?;
+                variances[k] = value.max(T::ZERO);
+            } else if variances[k] > T::ZERO {
+                rows[i][k] = value / variances[k];
+            }
+        }
+    }
+    Ok(Covariance { rows, variances })
 }
 
 /// Share of a variance that may be lost to rounding.

@@ -6,6 +6,22 @@ use crate::series::{
     turned, turned_single,
 };
 
+/// Square roots of the processor where it has them: the compiler knows these two names, and takes its instruction or the
+/// function of its own support. Either is exact by IEEE 754.
+#[cfg(target_os = "none")]
+#[expect(
+    unsafe_code,
+    reason = "two declarations; no stable function of core takes a square root"
+)]
+mod root {
+    unsafe extern "C" {
+        pub safe fn sqrt(x: f64) -> f64;
+        pub safe fn sqrtf(x: f32) -> f32;
+    }
+}
+#[cfg(not(target_os = "none"))]
+use libm as root;
+
 impl Real for f64 {
     #[inline]
     fn bits(self) -> u64 {
@@ -87,7 +103,7 @@ impl Scalar for f64 {
     }
     #[inline]
     fn sqrt(self) -> Self {
-        libm::sqrt(self)
+        root::sqrt(self)
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
@@ -165,7 +181,7 @@ impl Scalar for f32 {
     }
     #[inline]
     fn sqrt(self) -> Self {
-        libm::sqrtf(self)
+        root::sqrtf(self)
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {

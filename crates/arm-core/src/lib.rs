@@ -25,6 +25,7 @@ mod compensation;
 mod contact;
 mod contribution;
 mod coriolis;
+mod covariance;
 mod dynamics;
 pub mod effect;
 mod energy;

@@ -126,13 +126,12 @@ pub(crate) fn far_reduced_sin_cos(x: f32) -> Reduced<f32> {
 #[inline]
 fn series<T: Scalar>(c: &[f64], z: T) -> T {
     let square = z * z;
-    let pair = |p: &[f64]| {
-        p[1..]
-            .iter()
-            .fold(T::of(p[0]), |sum, &next| sum + T::of(next) * z)
+    let (pairs, odd) = c.as_chunks();
+    let mut pairs = pairs.iter().rev().map(|&[a, b]| T::of(a) + T::of(b) * z);
+    let last = match odd {
+        &[last] => T::of(last),
+        _ => pairs.next().unwrap_or(T::ZERO),
     };
-    let mut pairs = c.chunks(2).rev().map(pair);
-    let last = pairs.next().unwrap_or(T::ZERO);
     pairs.fold(last, |sum, next| next + square * sum)
 }
 

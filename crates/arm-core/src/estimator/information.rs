@@ -12,8 +12,8 @@ use crate::scalar::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Information<T, const P: usize> {
     /// Above the diagonal.
-    u: [[T; P]; P],
-    d: [T; P],
+    pub(super) u: [[T; P]; P],
+    pub(super) d: [T; P],
     /// `U x = z`.
     z: [T; P],
 }
@@ -119,36 +119,40 @@ impl<T: Real, const P: usize> Information<T, P> {
         self.z[unknown] = to;
     }
 
-    /// Standard deviations of weighted sums of the unknowns, `‖R⁻ᵀ w‖` each; the weights are spent.
+    /// Rows of `U⁻¹`, from `first` on.
     ///
     /// Two columns of `U` in one loop, whose sums stay in registers.
-    pub fn deviations<const N: usize>(&self, w: &mut [[T; P]; N]) -> [T; N] {
-        let mut sums = [T::ZERO; N];
-        let mut k = 0;
-        while k < P {
+    pub fn inverse_rows<const N: usize>(&self, first: usize, rows: &mut [[T; P]; N]) {
+        for (j, row) in rows.iter_mut().enumerate() {
+            row.fill(T::ZERO);
+            if let Some(diagonal) = row.get_mut(first + j) {
+                *diagonal = T::ONE;
+            }
+        }
+        for pair in first / 2..P.div_ceil(2) {
+            let k = 2 * pair;
+            if k >= P {
+                break;
+            }
             // The last of an odd number stands beside itself.
             let next = if k + 1 < P { k + 1 } else { k };
-            let mut here: [T; N] = from_fn(|j| w[j][k]);
-            let mut there: [T; N] = from_fn(|j| w[j][next]);
-            for i in 0..k {
-                let [u, v] = [self.u[i][k], self.u[i][next]];
+            let mut here: [T; N] = from_fn(|j| rows[j][k]);
+            let mut there: [T; N] = from_fn(|j| rows[j][next]);
+            for i in first..k {
+                let Some(upper) = self.u.get(i) else { break };
+                let [u, v] = [upper[k], upper[next]];
                 for j in 0..N {
-                    here[j] -= u * w[j][i];
-                    there[j] -= v * w[j][i];
+                    here[j] -= u * rows[j][i];
+                    there[j] -= v * rows[j][i];
                 }
             }
             for j in 0..N {
-                w[j][k] = here[j];
-                sums[j] += here[j].squared() / self.d[k];
+                rows[j][k] = here[j];
                 if next > k {
-                    there[j] -= self.u[k][next] * here[j];
-                    w[j][next] = there[j];
-                    sums[j] += there[j].squared() / self.d[next];
+                    rows[j][next] = there[j] - self.u[k][next] * here[j];
                 }
             }
-            k += 2;
         }
-        sums.map(T::sqrt)
     }
 
     /// One over the variance of an unknown, were those that follow it known; it serves to compare unknowns of different

@@ -27,11 +27,12 @@ use channel::{Channel, Smooth};
 use information::{Information, Row};
 use schedule::Work;
 use settings::Tuning;
-use window::Window;
+use window::Windows;
 
 use core::array::from_fn;
 
 use crate::compensation::GravityCompensation;
+use crate::covariance::Covariance;
 use crate::effect::{MAX_STATES, Motion, States};
 use crate::equation::{Equation, Measured, Needed, Prior};
 use crate::scalar::Real;
@@ -67,22 +68,23 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     /// A restart that the next sample's status tells.
     restarted: bool,
     last: SampleStatus,
-    window: Window<T, N, P>,
-    full: Window<T, N, P>,
+    windows: Windows<T, N, P>,
     work: Work,
     /// The row that is being taken in.
     row: Option<Row<T, P>>,
     information: Information<T, P>,
-    /// The same with unknowns fixed to their bounds.
+    /// The same with unknowns fixed to their bounds; then the place in which the next covariance is made.
     bounded: Information<T, P>,
+    /// That of the estimates, of the window that they were published with.
+    covariance: Covariance<T, P>,
     fixed: [bool; P],
     /// The last that was solved for.
     solution: [T; P],
     prior_row: usize,
-    /// Running means of squared residuals and of products of neighbouring ones, in units of the noise; windows so far.
+    /// Running means of squared residuals and of products of neighbouring ones, in units of the noise; windows that were judged.
     residual: [T; 2],
     last_residual: [Option<T>; N],
-    windows: T,
+    judged: T,
     /// See [`Estimator::excess`].
     excess: T,
     estimates: [Estimate<T>; P],
@@ -122,18 +124,18 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             restarts: 0,
             restarted: false,
             last: SampleStatus::Settling,
-            window: Window::EMPTY,
-            full: Window::EMPTY,
+            windows: Windows::EMPTY,
             work: Work::Idle,
             row: None,
             information,
             bounded: information,
+            covariance: Covariance::independent(priors.map(|p| p.sd.squared())),
             fixed: [false; P],
             solution: [T::ZERO; P],
             prior_row: 0,
             residual: [T::ZERO; 2],
             last_residual: [None; N],
-            windows: T::ZERO,
+            judged: T::ZERO,
             excess: T::ONE,
             estimates,
         })
@@ -175,20 +177,20 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
 
     /// The torques that carry the arm at rest, or with what its effects resist with at the speeds of `motion`.
     ///
-    /// With their standard deviation from the covariance of all unknowns. Give a motion without speed for the weight and
-    /// the passive moments alone.
+    /// With their standard deviation from the covariance of all unknowns, as of the last window. Give a motion without speed
+    /// for the weight and the passive moments alone.
     pub fn carry(&self, motion: &Motion<T, N>) -> GravityCompensation<T, N> {
         let mut rows = Needed::none();
         self.equation.add_carrying(motion, &self.memory, &mut rows);
         let torque = rows.torque_of(|i| self.estimates[i].value);
         let expected = rows.torque_of(|i| self.priors[i].mean);
         let far = |j: usize| (torque[j] - expected[j]).abs();
-        let sd = self.information.deviations(&mut rows.columns);
+        let sd = |j: usize| self.excess * self.covariance.deviation(&rows.columns[j]);
         GravityCompensation {
             // Not a number is not within.
             within: (0..N).all(|j| far(j) <= self.tuning.envelope[j]),
             torque,
-            sd: joints(sd.map(|sd| self.excess * sd)),
+            sd: joints(from_fn(sd)),
         }
     }
 
@@ -224,7 +226,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         };
         if fault == SampleStatus::Refused(Fault::Frozen) {
             // What was read since it froze is not to be trusted either.
-            self.window = Window::EMPTY;
+            self.windows.open().clear();
             if let Work::Wait(_) = self.work {
                 self.work = Work::Idle;
             }
@@ -320,7 +322,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.running = false;
         self.memory = [[T::ZERO; MAX_STATES]; E];
         self.usual = self.tuning.noise;
-        self.window = Window::EMPTY;
+        self.windows.open().clear();
         self.restarts = self.restarts.saturating_add(1);
         self.restarted = true;
     }
@@ -349,7 +351,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.led = sample.lead.is_some();
         self.moving = false;
         self.settling = self.tuning.settling;
-        self.window = Window::EMPTY;
+        self.windows.open().clear();
         SampleStatus::Settling
     }
 
@@ -369,7 +371,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         } else {
             SampleStatus::Taken
         };
-        self.window.moved |= self.moving;
+        self.windows.open().moved |= self.moving;
         self.age();
         match heed {
             SampleStatus::Taken if !self.moving => SampleStatus::Resting,
@@ -404,21 +406,24 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
         self.age = 0;
         for j in 0..N {
-            self.window
-                .add(j, &rows.columns[j], acting[j] - rows.known[j]);
+            let window = self.windows.open();
+            window.add(j, &rows.columns[j], acting[j] - rows.known[j]);
         }
         SampleStatus::Taken
     }
 
     /// One period more in the window; a full one is handed on.
     fn age(&mut self) {
-        self.window.age += 1;
-        if self.window.age >= self.tuning.window {
-            if self.window.moved && self.window.counts.iter().any(|&n| n >= self.tuning.enough) {
-                self.full = self.window;
-                self.work = Work::Wait(self.tuning.quarantine);
-            }
-            self.window = Window::EMPTY;
+        let window = self.windows.open();
+        window.age += 1;
+        if window.age < self.tuning.window {
+            return;
+        }
+        if window.moved && window.counts.iter().any(|&n| n >= self.tuning.enough) {
+            self.work = Work::Wait(self.tuning.quarantine);
+            self.windows.exchange();
+        } else {
+            window.clear();
         }
     }
 }

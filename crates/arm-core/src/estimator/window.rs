@@ -26,15 +26,25 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
         values: [T::ZERO; N],
     };
 
+    /// Begins anew. Sums are not cleared: the first row takes their place.
+    pub fn clear(&mut self) {
+        (self.age, self.moved, self.counts) = (0, false, [0; N]);
+    }
+
     /// Adds the row of a joint.
     pub fn add(&mut self, joint: usize, columns: &[T; P], value: T) {
-        if joint < N {
-            self.counts[joint] += 1;
-            for (sum, &column) in self.columns[joint].iter_mut().zip(columns) {
-                *sum += column;
-            }
-            self.values[joint] += value;
+        if joint >= N {
+            return;
         }
+        self.counts[joint] += 1;
+        if self.counts[joint] == 1 {
+            (self.columns[joint], self.values[joint]) = (*columns, value);
+            return;
+        }
+        for (sum, &column) in self.columns[joint].iter_mut().zip(columns) {
+            *sum += column;
+        }
+        self.values[joint] += value;
     }
 
     /// The mean row of a joint. `None` with too few rows.
@@ -55,5 +65,35 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
             value: value * share,
             weight,
         })
+    }
+}
+
+/// The window that is being filled, and the full one that is worked on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Windows<T, const N: usize, const P: usize> {
+    both: [Window<T, N, P>; 2],
+    second: bool,
+}
+
+impl<T: Real, const N: usize, const P: usize> Windows<T, N, P> {
+    pub const EMPTY: Self = Self {
+        both: [Window::EMPTY; 2],
+        second: false,
+    };
+
+    pub fn open(&mut self) -> &mut Window<T, N, P> {
+        let [first, second] = &mut self.both;
+        if self.second { second } else { first }
+    }
+
+    pub fn full(&self) -> &Window<T, N, P> {
+        let [first, second] = &self.both;
+        if self.second { first } else { second }
+    }
+
+    /// The open one is full; the other begins.
+    pub fn exchange(&mut self) {
+        self.second = !self.second;
+        self.open().clear();
     }
 }

@@ -3,6 +3,7 @@
 use super::information::Row;
 use super::schedule::{Work, split};
 use super::{Decision, Estimate, Estimator};
+use crate::covariance::Covariance;
 use crate::scalar::Real;
 
 /// Share of the prior's variance that the data must have taken away before an unknown counts as identified.
@@ -35,7 +36,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             Work::Row(number) => {
                 self.row = match number.checked_sub(1) {
                     None => self.forget(),
-                    Some(j) => self.full.mean(j, &self.tuning),
+                    Some(j) => self.windows.full().mean(j, &self.tuning),
                 };
                 self.absorb(0, split(P));
                 Work::Rest(number)
@@ -73,8 +74,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 if first + N < P {
                     Work::Deviations(first + N)
                 } else {
-                    Work::Idle
+                    Work::Covariance
                 }
+            }
+            Work::Covariance => {
+                self.covariance.rows = self.bounded.u;
+                self.covariance.variances = self.information.d.map(|d| T::ONE / d);
+                Work::Idle
             }
         }
     }
@@ -138,9 +144,10 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         for (estimate, prior) in self.estimates.iter_mut().zip(&self.priors) {
             *estimate = Estimate::of_prior(prior);
         }
+        self.covariance = Covariance::independent(self.priors.map(|p| p.sd.squared()));
         self.residual = [T::ZERO; 2];
         self.last_residual = [None; N];
-        self.windows = T::ZERO;
+        self.judged = T::ZERO;
         self.excess = T::ONE;
         self.restart();
         Work::Idle
@@ -152,10 +159,10 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             let prior = &self.priors[i];
             self.estimates[i].value = self.solution[i].max(prior.min).min(prior.max);
         }
-        self.windows = (self.windows + T::ONE).min(T::of(LONG));
+        self.judged = (self.judged + T::ONE).min(T::of(LONG));
         let (mut square, mut product, mut count) = (T::ZERO, T::ZERO, T::ZERO);
         for j in 0..N {
-            let Some(row) = self.full.mean(j, &self.tuning) else {
+            let Some(row) = self.windows.full().mean(j, &self.tuning) else {
                 self.last_residual[j] = None;
                 continue;
             };
@@ -167,7 +174,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             self.last_residual[j] = Some(rest);
         }
         if count > T::ZERO {
-            let share = T::ONE / self.windows;
+            let share = T::ONE / self.judged;
             let [old_square, old_product] = self.residual;
             self.residual = [
                 old_square + share * (square / count - old_square),
@@ -180,18 +187,20 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.excess = (square.max(T::ONE) * (T::ONE + alike) / (T::ONE - alike)).sqrt();
     }
 
-    /// How certain some unknowns are, from one on, and by what.
+    /// How certain some unknowns are, from one on, and by what; their rows of the next covariance.
     fn judge(&mut self, first: usize) {
-        let mut weights = [[T::ZERO; P]; N];
-        for (j, weights) in weights.iter_mut().enumerate() {
-            if let Some(weight) = weights.get_mut(first + j) {
-                *weight = T::ONE;
-            }
-        }
-        let deviations = self.information.deviations(&mut weights);
+        // Where fewer are left, some before are judged again.
+        let first = first.min(P.saturating_sub(N));
+        let places = self.bounded.u.get_mut(first..);
+        let Some(rows) = places.and_then(|rows| rows.first_chunk_mut::<N>()) else {
+            return;
+        };
+        self.information.inverse_rows(first, rows);
         let estimates = self.estimates.iter_mut().zip(&self.priors).zip(&self.fixed);
-        for (((estimate, prior), &fixed), own) in estimates.skip(first).zip(deviations) {
-            let sd = own * self.excess;
+        for (((estimate, prior), &fixed), row) in estimates.skip(first).zip(rows) {
+            let squares = row.iter().zip(&self.information.d);
+            let variance = squares.fold(T::ZERO, |sum, (&r, &d)| sum + r.squared() / d);
+            let sd = variance.sqrt() * self.excess;
             let left = (sd / prior.sd).squared();
             estimate.sd = sd.min(prior.sd);
             estimate.decided_by = if fixed {
