@@ -157,17 +157,17 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
 
   /* What that should take, all effects included. */
   armrs_load load;
-  memset(&load, 0, sizeof load);
+  for (size_t j = 0; j < ARMRS_JOINTS; j++) load.torque[j] = 0;
+  load.moment_on_arm = 0;
   for (size_t c = 0; c < 2; c++) load.force_on_arm[c] = (armrs_real)sensor->force[c] * ((armrs_real)220 / 4096);
   status = armrs_inverse_dynamics(&arm, &wanted, &load, needed);
   if (status != ARMRS_OK) return status;
   count(1, &since);
 
   /* Is it safe? */
+  static armrs_observation seen; /* Of the channels that are not used it holds zeros. */
   armrs_sample sample;
-  armrs_observation seen;
   armrs_stop stop;
-  memset(&seen, 0, sizeof seen);
   seen.now = (uint64_t)k * PERIOD_US;
   seen.stamp = seen.now;
   armrs_real power = 0;
@@ -200,10 +200,9 @@ static armrs_status period(uint32_t k, const reading *sensor, armrs_real torque[
   uint32_t asked = begin;
   count(5, &asked);
 
-  /* What carries it there? */
-  armrs_motion still = wanted;
-  for (size_t j = 0; j < ARMRS_JOINTS; j++) still.qd[j] = still.qdd[j] = 0;
-  status = armrs_estimator_carry(&estimator, &still, torque, sd);
+  /* What carries it there, at rest? */
+  for (size_t j = 0; j < ARMRS_JOINTS; j++) wanted.qd[j] = 0;
+  status = armrs_estimator_carry(&estimator, &wanted, torque, sd);
   count(4, &since);
   count(6, &begin);
   digest_values(robot_q, 2);

@@ -5,10 +5,10 @@ use core::array::from_fn;
 use crate::effect::{
     ActsOn, Effect, Motion, Place, States, advance_states, any_state, resisting_torque,
 };
+use crate::kinematics::to_links;
+use crate::regressor::link_columns;
 use crate::scalar::Real;
-use crate::{
-    Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, regressor, static_torque,
-};
+use crate::{Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, static_torque};
 
 /// What is known of an unknown before any data, and what it may never be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -285,9 +285,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         let pose = Pose::new(&motion.q);
         self.add_inertial(&pose, [&motion.qd, &motion.qdd], rows);
         if self.feels_force() {
-            let moving = (&motion.qd, &motion.qdd);
-            let force = joint_force(&self.chain, &pose, moving, measured.force_on_arm);
-            self.add_effects(&motion.with_joint_force(&force), memory, rows);
+            self.add_effects_under_load(&pose, motion, memory, measured.force_on_arm, rows);
         } else {
             self.add_effects(motion, memory, rows);
         }
@@ -346,19 +344,35 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         [qd, qdd]: [&Joints<T, N>; 2],
         rows: &mut Needed<T, N, P>,
     ) {
-        let y = regressor(&self.chain, pose, qd, qdd);
+        let moving = [&to_links(qd), &to_links(qdd)];
         for j in 0..N {
-            let moments = (0..N).map(|k| y.x[(j, k)]);
-            let inertias = (0..N).map(|k| y.j[(j, k)]);
-            for (place, value) in rows.columns[j].iter_mut().zip(moments.chain(inertias)) {
-                *place = value;
-            }
-            let mut known = self.chain.rotor[j] * qdd[j];
-            for k in 0..N {
-                known += y.h[(j, k)] * self.chain.h[k];
-            }
-            rows.known[j] = known;
+            rows.known[j] = self.chain.rotor[j] * qdd[j];
         }
+        for k in 0..N {
+            let [x, h, inertia] = link_columns(&self.chain, pose, moving, k);
+            for (j, row) in rows.columns.iter_mut().enumerate() {
+                for (place, column) in [(k, &x), (N + k, &inertia)] {
+                    if let Some(place) = row.get_mut(place) {
+                        *place = column[j];
+                    }
+                }
+                rows.known[j] += h[j] * self.chain.h[k];
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn add_effects_under_load(
+        &self,
+        pose: &Pose<T, N>,
+        motion: &Motion<T, N>,
+        memory: &[States<T>; E],
+        force_on_arm: [T; 2],
+        rows: &mut Needed<T, N, P>,
+    ) {
+        let moving = (&motion.qd, &motion.qdd);
+        let force = joint_force(&self.chain, pose, moving, force_on_arm);
+        self.add_effects(&motion.with_joint_force(&force), memory, rows);
     }
 
     #[inline(never)]

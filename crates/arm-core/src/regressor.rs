@@ -55,8 +55,7 @@ pub fn regressor<T: Scalar, const N: usize>(
     qd: &Joints<T, N>,
     qdd: &Joints<T, N>,
 ) -> Regressor<T, N> {
-    let (speed, acceleration) = (to_links(qd), to_links(qdd));
-    let [gy, gz] = chain.gravity;
+    let moving = [&to_links(qd), &to_links(qdd)];
     let zero = JointMatrix::<T, N>::repeat(T::ZERO);
     let mut y = Regressor {
         x: zero,
@@ -64,22 +63,35 @@ pub fn regressor<T: Scalar, const N: usize>(
         j: zero,
     };
     for k in 0..N {
-        let (mut x, mut h, mut j) = ([T::ZERO; N], [T::ZERO; N], [T::ZERO; N]);
-        x[k] = gy * pose.sin[k] - gz * pose.cos[k];
-        h[k] = gy * pose.cos[k] + gz * pose.sin[k];
-        j[k] = acceleration[k];
-        // Every link before k carries the moment of link k at its end.
-        for i in 0..k {
-            let a = chain.segments[i].length;
-            let (c, s) = pose.difference(i, k);
-            x[i] += a * (c * acceleration[k] + s * speed[k].squared());
-            h[i] += a * (s * acceleration[k] - c * speed[k].squared());
-            x[k] += a * (c * acceleration[i] - s * speed[i].squared());
-            h[k] += a * (s * acceleration[i] + c * speed[i].squared());
-        }
-        y.x.set_column(k, &to_joint_torque(&x));
-        y.h.set_column(k, &to_joint_torque(&h));
-        y.j.set_column(k, &to_joint_torque(&j));
+        let [x, h, j] = link_columns(chain, pose, moving, k);
+        y.x.set_column(k, &x);
+        y.h.set_column(k, &h);
+        y.j.set_column(k, &j);
     }
     y
+}
+
+/// The columns to the moments of link `k`: `X_k`, `H_k`, `J_k`; speeds and accelerations are those of the links.
+#[inline]
+pub(crate) fn link_columns<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    [speed, acceleration]: [&[T; N]; 2],
+    k: usize,
+) -> [Joints<T, N>; 3] {
+    let [gy, gz] = chain.gravity;
+    let (mut x, mut h, mut j) = ([T::ZERO; N], [T::ZERO; N], [T::ZERO; N]);
+    x[k] = gy * pose.sin[k] - gz * pose.cos[k];
+    h[k] = gy * pose.cos[k] + gz * pose.sin[k];
+    j[k] = acceleration[k];
+    // Every link before k carries the moment of link k at its end.
+    for i in 0..k {
+        let a = chain.segments[i].length;
+        let (c, s) = pose.difference(i, k);
+        x[i] += a * (c * acceleration[k] + s * speed[k].squared());
+        h[i] += a * (s * acceleration[k] - c * speed[k].squared());
+        x[k] += a * (c * acceleration[i] - s * speed[i].squared());
+        h[k] += a * (s * acceleration[i] + c * speed[i].squared());
+    }
+    [x, h, j].map(|links| to_joint_torque(&links))
 }

@@ -210,6 +210,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.last
     }
 
+    /// Filters, row and work are functions of their own, so that a period never needs the stack of two of them at once.
     fn step(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
         let mut motion = Motion::new(T::ZERO, joints([T::ZERO; N]), joints([T::ZERO; N]));
         let mut measured = Measured::none();
@@ -236,7 +237,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     /// Checks and filters a sample.
-    #[inline]
+    #[inline(never)]
     fn sense(
         &mut self,
         sample: Option<&Sample<T, N>>,
@@ -379,6 +380,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
     }
 
+    #[inline(never)]
     fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> SampleStatus {
         let mut rows = Needed::none();
         let acting = self

@@ -28,6 +28,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     /// One unit of work.
+    #[inline(never)]
     fn work_once(&mut self) {
         self.work = match self.work {
             Work::Idle => Work::Idle,
