@@ -43,7 +43,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
     ) -> Result<Self, Invalid> {
         for i in 0..P {
             check::finite("value of unknown", i, values[i])?;
-            for &value in &covariance[i][..=i] {
+            for &value in covariance[i].iter().take(i + 1) {
                 check::finite("covariance of unknown", i, value)?;
             }
         }
@@ -83,7 +83,7 @@ fn factorised<T: Real, const P: usize>(
         mut variances,
     } = Covariance::independent([T::ZERO; P]);
     for k in (0..P).rev() {
-        for i in (0..=k).rev() {
+        for i in (0..P).rev().filter(|&i| i <= k) {
             let mut value = covariance[k][i];
             for m in k + 1..P {
                 value -= rows[i][m] * rows[k][m] * variances[m];
