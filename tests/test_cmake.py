@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -155,3 +156,26 @@ def test_a_project_finds_the_library_with_pkg_config(installed: Path, tmp_path: 
     assert "-DARMRS_TWO_JOINTS" in told
     run("cc", "-std=c99", "main.c", *told.split(), "-o", "main", cwd=tmp_path)
     assert float(run(tmp_path / "main")) == pytest.approx(9.81 * LEVEL, rel=1e-11)
+
+
+def test_a_package_of_a_release_holds_what_cmake_finds(tmp_path: Path) -> None:
+    if not os.environ.get("ARMRS_EMULATOR"):
+        pytest.skip("builds a library for a device: with ARMRS_EMULATOR=1, as make crosscheck does")
+    command = [str(ROOT / "scripts" / "device_libraries.sh"), str(tmp_path), "cortex-m4-single-2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode == 77:
+        pytest.skip(done.stderr.strip())
+    assert done.returncode == 0, done.stderr
+    with zipfile.ZipFile(tmp_path / "armrs-cortex-m4-single-2.zip") as archive:
+        names = {name.split("/", 1)[1] for name in archive.namelist()}
+        config = archive.read("armrs-cortex-m4-single-2/lib/cmake/armrs/armrsConfig.cmake").decode()
+    assert {"include/armrs.h", "include/armrs.hpp", "lib/libarmrs_c.a", "lib/pkgconfig/armrs.pc", "LICENSE-MIT", "LICENSE-APACHE"} <= names
+    assert "ARMRS_SINGLE" in config and "ARMRS_TWO_JOINTS" in config
+
+
+def test_a_package_that_there_is_none_of_is_refused(tmp_path: Path) -> None:
+    command = [str(ROOT / "scripts" / "device_libraries.sh"), str(tmp_path), "cortex-m0-single-2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode == 77:
+        pytest.skip(done.stderr.strip())
+    assert done.returncode == 2 and "cortex-m0-single-2" in done.stderr and "cortex-m4-single-3" in done.stderr

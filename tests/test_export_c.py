@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 import armrs
+from armrs import online
 from armrs.catalogue import catalogue
 from armrs.cli import main
 from armrs.errors import BadInput
 from armrs.model import Effect
 from armrs.workflows.demo import true_model
-from armrs.workflows.firmware import FirmwareSource, export_c
+from armrs.workflows.firmware import FirmwareSource, covariance_of, export_c, unknowns_of
 
 ROOT = Path(__file__).parents[1]
 INCLUDE = ROOT / "crates" / "arm-capi" / "include"
@@ -70,6 +71,44 @@ def test_the_torques_of_the_device_are_those_of_the_computer(identified: Path, t
         assert np.array_equal(torques, source.torques)
     sd = numbers(lines, "sd", single)
     assert np.all(sd > 0) and np.all(sd < 0.5)
+
+
+def test_the_covariance_of_the_device_has_the_correlations_of_the_identification(identified: Path) -> None:
+    """What trades in the data is known better together: the torque's deviation is not that of independent errors."""
+    path = identified / "identified.json"
+    result, model = json.loads(path.read_text()), armrs.load_model(identified / "identified.toml")
+    covariance = covariance_of(model, path)
+    sd = np.array([e["std"] for e in result["combinations"]])
+    assert np.allclose(np.diag(covariance)[:4], sd**2, rtol=1e-12)
+    assert result["correlated"][:4] == [e["name"] for e in result["combinations"]]
+    between = np.array(result["correlations"])
+    assert np.allclose(between, between.T) and np.allclose(np.diag(between), 1.0) and np.linalg.eigvalsh(between).min() > -1e-9
+    assert np.abs(between - np.eye(len(between))).max() > 0.3
+    assert np.allclose(covariance[:4, :4] / np.outer(sd, sd), between[:4, :4])
+    # The parameters of friction stand behind, each with its own standard deviation and not that of a neighbour of its kind.
+    own = {(e["kind"], e["joint"], e["name"]): e["std"] for e in result["parameters"]}
+    for place, (name, joint, _) in enumerate(unknowns_of(model)[4:], start=4):
+        kind, parameter = name.split(" ")
+        assert covariance[place, place] == own.get((kind, joint, parameter), 0.0) ** 2
+    q = np.array([[0.0, 0.0], [-1.0, 0.8]])
+    with_all = online.Compensation(model, path).carry(q)
+    alone = np.sqrt([self_of(model, covariance, row) for row in q])
+    assert np.allclose(with_all.sd[:, 0], alone, rtol=1e-9)
+
+
+def self_of(model: armrs.Model, covariance: np.ndarray, q: np.ndarray) -> float:
+    """Return the variance of the shoulder's carrying torque at rest, by hand: g (cos q1, cos(q1 + q2)) times the first moments, and springs."""
+    weights = np.zeros(len(covariance))
+    weights[:2] = model.gravity * np.cos(np.cumsum(q))
+    return float(weights @ covariance @ weights)
+
+
+def test_an_older_result_without_correlations_is_taken(identified: Path, tmp_path: Path) -> None:
+    result = json.loads((identified / "identified.json").read_text())
+    del result["correlated"], result["correlations"]
+    (tmp_path / "old.json").write_text(json.dumps(result))
+    covariance = covariance_of(armrs.load_model(identified / "identified.toml"), tmp_path / "old.json")
+    assert np.array_equal(covariance, np.diag(np.diag(covariance)))
 
 
 def test_a_device_whose_torque_differs_by_a_bit_says_so(identified: Path, tmp_path: Path) -> None:
@@ -194,6 +233,6 @@ def test_a_library_of_another_precision_does_not_link(identified: Path, tmp_path
     for wrong, symbol in ((["-DARMRS_TWO_JOINTS", "-DARMRS_SINGLE"], "single_two"), ([], "double_three")):
         done = link(*wrong)
         assert done.returncode != 0
-        assert f"armrs_abi_2_{symbol}_joints" in done.stderr
+        assert f"armrs_abi_3_{symbol}_joints" in done.stderr
     assert link("-DARMRS_TWO_JOINTS", "-fshort-enums").returncode == 0
     assert subprocess.run([tmp_path / "a"], check=False).returncode == 0

@@ -44,26 +44,35 @@ def replayed(log: online.Log) -> online.Replay:
     return online.replay(log, MODEL, every=1)
 
 
-def in_c(log: online.Log, folder: Path) -> bytes:
+@pytest.fixture(scope="module")
+def replayed_single(log: online.Log) -> online.Replay:
+    return online.replay(log, MODEL, settings=online.default_settings(MODEL, PERIOD, "single"), every=1)
+
+
+def in_c(log: online.Log, folder: Path, precision: str) -> bytes:
     """Return what the C library makes of a log, with the arm that `armrs export-c` writes."""
-    armrs.export_c(MODEL).write(folder)
-    run(folder, "host-double")
+    armrs.export_c(MODEL, precision=precision).write(folder)
+    run(folder, f"host-{precision}")
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    library = target / "crosscheck" / "host-double-two" / "firmware" / "libarmrs_c.a"
+    library = target / "crosscheck" / f"host-{precision}-two" / "firmware" / "libarmrs_c.a"
     sources = [str(ROOT / "tests" / "online.c"), str(folder / "armrs_model.c")]
-    compiled = ["cc", "-std=c99", "-O1", "-ffp-contract=off", *BASE_FLAGS, f"-I{folder}", *sources, str(library)]
+    flags = [*BASE_FLAGS, *(["-DARMRS_SINGLE"] if precision == "single" else [])]
+    compiled = ["cc", "-std=c99", "-O1", "-ffp-contract=off", *flags, f"-I{folder}", *sources, str(library)]
     subprocess.run([*compiled, "-lm", "-lpthread", "-ldl", "-o", str(folder / "device")], check=True)
     places = log.places(PERIOD)
     rows = np.zeros((places[-1] + 1, 8))
     rows[places] = np.column_stack([~log.empty, log.q, log.torque, log.hand])
-    given = np.concatenate([[len(rows), PERIOD], rows.ravel()])
+    given = np.concatenate([[len(rows), PERIOD], rows.ravel()]).astype("f4" if precision == "single" else "f8")
     return subprocess.run([folder / "device"], input=given.tobytes(), capture_output=True, check=True).stdout
 
 
-def test_python_has_the_bits_of_the_c_interface(log: online.Log, replayed: online.Replay, tmp_path: Path) -> None:
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_python_has_the_bits_of_the_c_interface(log: online.Log, precision: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     if shutil.which("cc") is None:
         pytest.skip("no C compiler")
-    told = np.frombuffer(in_c(log, tmp_path))
+    replayed: online.Replay = request.getfixturevalue("replayed" if precision == "double" else "replayed_single")
+    assert replayed.settings.precision == precision
+    told = np.frombuffer(in_c(log, tmp_path, precision), "f8" if precision == "double" else "f4").astype(float)
     n = len(replayed.status)
     rows, end = told[: 9 * n].reshape(n, 9), told[9 * n :]
     assert np.array_equal(np.array(STATUSES)[rows[:, 0].astype(int)], replayed.status)
@@ -71,17 +80,32 @@ def test_python_has_the_bits_of_the_c_interface(log: online.Log, replayed: onlin
     there = replayed.status != "missing"  # the device still holds the angles of an empty sample
     assert np.array_equal(rows[there, 1:3], replayed.torque[there], equal_nan=True)
     assert np.array_equal(rows[there, 3:5], replayed.torque_sd[there], equal_nan=True)
-    carried = online.Compensation(MODEL).carry(log.q)
+    carried = online.Compensation(MODEL, precision=precision).carry(log.q)
     assert np.array_equal(rows[log.places(PERIOD), 5:9], np.hstack([carried.torque, carried.sd]), equal_nan=True)
     unknowns = len(replayed.estimates)
     decided = np.array(["data", "prior", "bound"])
     for e, (value, sd, by) in zip(replayed.estimates, end[: 3 * unknowns].reshape(unknowns, 3), strict=True):
         assert (e.value, e.std, e.decided_by) == (value, sd, decided[int(by)])
     assert np.array_equal(end[3 * unknowns :][:5], [*replayed.residual[-1], replayed.excess[-1], replayed.age[-1], replayed.restarts])
+    if precision == "single":
+        return  # the monitor of Python computes in double precision
     channels = [online.Channel("angle", -2.0, 2.0, fastest=3.0, farthest=0.5, frozen_after=0.2)] * 2
     stop = online.watch(log.t, log.q, channels, period=0.1, oldest=0.002, moving=np.ones(len(log.t), dtype=bool))
     assert stop is not None and stop.reason == "not finite" and end[-5] == 1.0
     assert (stop.channel, round(stop.at * 1e6)) == (end[-4], end[-1])
+
+
+def test_single_precision_learns_what_double_precision_does(replayed: online.Replay, replayed_single: online.Replay) -> None:
+    """Within a tenth of a standard deviation: rounding is far below the noise of the sensors, and is there."""
+    off = (replayed_single.values - replayed.values) / replayed.std
+    assert 0.0 < np.abs(off).max() < 0.1
+    assert np.mean(replayed_single.status == replayed.status) > 0.999
+
+
+def test_a_precision_that_no_library_has_is_refused() -> None:
+    for make in (lambda: online.default_settings(MODEL, PERIOD, "half"), lambda: online.Compensation(MODEL, precision="half")):
+        with pytest.raises(armrs.BadInput, match="precision"):
+            make()
 
 
 def test_sample_by_sample_is_the_whole_log(log: online.Log, replayed: online.Replay) -> None:

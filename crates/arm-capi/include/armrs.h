@@ -55,12 +55,12 @@
 
 #if !defined(ARMRS_SINGLE)
 // Size of an `armrs_compensation`.
-#define ARMRS_COMPENSATION_WORDS 520
+#define ARMRS_COMPENSATION_WORDS 560
 #endif
 
 #if defined(ARMRS_SINGLE)
 // Size of an `armrs_compensation`.
-#define ARMRS_COMPENSATION_WORDS 300
+#define ARMRS_COMPENSATION_WORDS 320
 #endif
 
 #if !defined(ARMRS_SINGLE)
@@ -785,13 +785,13 @@ armrs_status armrs_verify(const void *memory,
 
 // The library has exactly one of these: one of another precision, number of joints or version does not link.
 #if defined(ARMRS_SINGLE) && defined(ARMRS_TWO_JOINTS)
-#define ARMRS_ABI armrs_abi_2_single_two_joints
+#define ARMRS_ABI armrs_abi_3_single_two_joints
 #elif defined(ARMRS_SINGLE)
-#define ARMRS_ABI armrs_abi_2_single_three_joints
+#define ARMRS_ABI armrs_abi_3_single_three_joints
 #elif defined(ARMRS_TWO_JOINTS)
-#define ARMRS_ABI armrs_abi_2_double_two_joints
+#define ARMRS_ABI armrs_abi_3_double_two_joints
 #else
-#define ARMRS_ABI armrs_abi_2_double_three_joints
+#define ARMRS_ABI armrs_abi_3_double_three_joints
 #endif
 #ifdef __cplusplus
 extern "C" {

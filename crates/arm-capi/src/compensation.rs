@@ -23,10 +23,10 @@ pub struct armrs_compensation {
 
 /// Size of an `armrs_compensation`.
 #[cfg(not(feature = "single"))]
-pub const ARMRS_COMPENSATION_WORDS: usize = 520;
+pub const ARMRS_COMPENSATION_WORDS: usize = 560;
 /// Size of an `armrs_compensation`.
 #[cfg(feature = "single")]
-pub const ARMRS_COMPENSATION_WORDS: usize = 300;
+pub const ARMRS_COMPENSATION_WORDS: usize = 320;
 
 type Core = Compensation<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 

@@ -55,15 +55,15 @@ macro_rules! abi {
         #[cfg($condition)]
         #[unsafe(no_mangle)]
         pub extern "C" fn $name() -> u32 {
-            2
+            3
         }
     )*};
 }
 abi! {
-    armrs_abi_2_double_three_joints when not(any(feature = "single", feature = "two-joints"));
-    armrs_abi_2_single_three_joints when all(feature = "single", not(feature = "two-joints"));
-    armrs_abi_2_double_two_joints when all(not(feature = "single"), feature = "two-joints");
-    armrs_abi_2_single_two_joints when all(feature = "single", feature = "two-joints");
+    armrs_abi_3_double_three_joints when not(any(feature = "single", feature = "two-joints"));
+    armrs_abi_3_single_three_joints when all(feature = "single", not(feature = "two-joints"));
+    armrs_abi_3_double_two_joints when all(not(feature = "single"), feature = "two-joints");
+    armrs_abi_3_single_two_joints when all(feature = "single", feature = "two-joints");
 }
 
 /// Where no operating system ends a program there is nothing to unwind to. The function called here exists nowhere: if any

@@ -79,6 +79,10 @@ pub struct Identification {
     pub combinations: Vec<Estimate>,
     /// Small imperfections of the measurement that were refitted within the declared tolerance.
     pub calibration: Vec<Estimate>,
+    /// Names of the quantities between which `correlations` are: the combinations, then parameters of effects (`coulomb1 torque`).
+    pub correlated: Vec<String>,
+    /// Correlations of their errors, by rows.
+    pub correlations: Vec<Vec<f64>>,
     /// What in the result cannot be true of this arm and these sensors, in words.
     pub contradictions: Vec<String>,
     /// What the fitted model does not describe well, in words.
@@ -128,6 +132,8 @@ impl Identification {
             parameters: result.parameters.clone(),
             combinations: result.combinations.clone(),
             calibration: result.calibration.clone(),
+            correlated: result.correlated.clone(),
+            correlations: result.correlations.clone(),
             contradictions: Vec::new(),
             misfits: Vec::new(),
             left_out: Vec::new(),
@@ -237,7 +243,7 @@ const MODEL_FILE: &str = "identified.toml";
 impl Serialize for Identification {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let warnings = [&self.contradictions[..], &self.misfits, &self.left_out].concat();
-        let mut out = to.serialize_struct("Identification", 15)?;
+        let mut out = to.serialize_struct("Identification", 17)?;
         out.serialize_field("method", &self.method)?;
         out.serialize_field("status", &self.status)?;
         out.serialize_field("rank", &self.rank)?;
@@ -245,6 +251,8 @@ impl Serialize for Identification {
         out.serialize_field("parameters", &self.parameters)?;
         out.serialize_field("combinations", &self.combinations)?;
         out.serialize_field("calibration", &self.calibration)?;
+        out.serialize_field("correlated", &self.correlated)?;
+        out.serialize_field("correlations", &self.correlations)?;
         out.serialize_field("warnings", &warnings)?;
         out.serialize_field("not_separable", &self.trades)?;
         out.serialize_field("scale_free", &self.scale_free)?;

@@ -2,7 +2,7 @@
 
 use arm_core::effect::{ActsOn, Effect, Kind, MAX_STATES, Motion, applied, resisting_torque};
 use arm_core::{
-    Calibration, Chain, Equation, Invalid, Pose, inverse_dynamics, joint_force, static_torque,
+    Calibration, Chain, Equation, Invalid, Pose, Real, inverse_dynamics, joint_force, static_torque,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -16,7 +16,7 @@ use crate::rig::Rig;
 pub const EFFECTS: usize = 12;
 pub const UNKNOWNS: usize = 18;
 /// The equation of motion as the C interface holds it.
-pub type DeviceEquation<const N: usize> = Equation<f64, N, UNKNOWNS, EFFECTS>;
+pub type DeviceEquation<T, const N: usize> = Equation<T, N, UNKNOWNS, EFFECTS>;
 
 /// What a device is told of a model.
 ///
@@ -64,7 +64,7 @@ fn told<'py, const N: usize>(
     uncertainty: f64,
     samples: &[Vec<f64>],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (equation, calibration) = device(chain, effects)?;
+    let (equation, calibration) = device::<f64, N>(chain, effects)?;
     let priors = equation.priors(uncertainty);
     let used = priors.iter().take(equation.used());
     let result = PyDict::new(py);
@@ -85,11 +85,12 @@ fn told<'py, const N: usize>(
     Ok(result)
 }
 
-/// The equation of motion that a device makes of an arm, with the places of the C interface, and the calibration of the sensors.
-pub fn device<const N: usize>(
+/// The equation of motion that a device makes of an arm in its precision, with the places of the C interface, and the calibration of
+/// the sensors.
+pub fn device<T: Real, const N: usize>(
     chain: &Chain<f64, N>,
     effects: &[Effect<f64>],
-) -> PyResult<(DeviceEquation<N>, Calibration<f64, N>)> {
+) -> PyResult<(DeviceEquation<T, N>, Calibration<f64, N>)> {
     if let Some(own) = effects.iter().find(|e| matches!(e.kind, Kind::Own(_))) {
         return Err(refused((
             0,
@@ -100,8 +101,16 @@ pub fn device<const N: usize>(
     }
     let calibration = Calibration::of(chain, effects).map_err(refused)?;
     let sensed = |e: &Effect<f64>| e.kind.acts_on() == ActsOn::Sensors;
-    let acting: Vec<_> = effects.iter().filter(|e| !sensed(e)).copied().collect();
-    let arm = applied(chain, &acting).map_err(refused)?;
+    let acting = effects.iter().filter(|e| !sensed(e));
+    let acting: Vec<Effect<T>> = acting
+        .map(|e| Effect {
+            kind: e.kind,
+            index: e.index,
+            parameters: e.parameters.map(T::of),
+            on: e.on,
+        })
+        .collect();
+    let arm = applied(&chain.cast(), &acting).map_err(refused)?;
     if acting.len() > EFFECTS {
         return Err(bad_input(
             "[[effect]]",
@@ -118,7 +127,25 @@ pub fn device<const N: usize>(
     Ok((equation, calibration))
 }
 
-fn off() -> Effect<f64> {
+/// What follows for the equation of motion of a rig on a device of some precision.
+macro_rules! with_equation {
+    ($rig:expr, $single:expr, $equation:ident => $then:expr) => {
+        match (&$rig.arm.chain, $single) {
+            ($crate::arm::AnyChain::Two(chain), false) => with_equation!(@ chain, $rig, f64, $equation, $then),
+            ($crate::arm::AnyChain::Three(chain), false) => with_equation!(@ chain, $rig, f64, $equation, $then),
+            ($crate::arm::AnyChain::Two(chain), true) => with_equation!(@ chain, $rig, f32, $equation, $then),
+            ($crate::arm::AnyChain::Three(chain), true) => with_equation!(@ chain, $rig, f32, $equation, $then),
+            _ => Err($crate::firmware::too_long($rig)),
+        }
+    };
+    (@ $chain:ident, $rig:expr, $real:ty, $equation:ident, $then:expr) => {{
+        let ($equation, _) = $crate::firmware::device::<$real, _>($chain, &$rig.effects)?;
+        $then
+    }};
+}
+pub(crate) use with_equation;
+
+fn off<T: Real>() -> Effect<T> {
     Effect {
         on: false,
         ..Effect::new(arm_core::effect::KINDS[0], 0)
@@ -126,7 +153,7 @@ fn off() -> Effect<f64> {
 }
 
 /// Inverse dynamics in the order of operations of `armrs_inverse_dynamics`.
-fn torque<const N: usize>(equation: &DeviceEquation<N>, sample: &[f64]) -> Vec<f64> {
+fn torque<const N: usize>(equation: &DeviceEquation<f64, N>, sample: &[f64]) -> Vec<f64> {
     let at = |k: usize| joints::<f64, N>(&sample[k * N..(k + 1) * N]);
     let (q, qd, qdd) = (at(0), at(1), at(2));
     let [y, z, moment] = [0, 1, 2].map(|k| sample[3 * N + k]);

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..model import Model, load_model
-from ..workflows.firmware import standard_deviations, unknowns_of
-from .settings import Settings, default_settings
+from ..workflows.firmware import covariance_of, unknowns_of
+from .settings import PRECISIONS, Settings, default_settings
 
 STATUSES = tuple(_armrs.SAMPLE_STATUSES)
 """What may become of a sample, by the numbers of the C interface: the first three are no refusals."""
@@ -106,7 +106,7 @@ class _Carries:
 
 
 class Estimator(_Carries):
-    """The online estimator of the C interface, in double precision and with its bits. It learns: `update` changes it.
+    """The online estimator of the C interface with its bits, in the precision of its settings. It learns: `update` changes it.
 
     Parameters
     ----------
@@ -209,15 +209,25 @@ class Compensation(_Carries):
     model : Model or path
         As identified.
     identified : path, optional
-        `identified.json`, for the standard deviations; without it those of the segments follow from `segment_uncertainty`, and effects
-        count as exact.
+        `identified.json`, for standard deviations and correlations; without it those of the segments follow from `segment_uncertainty`,
+        and effects count as exact.
+    precision : {"double", "single"}
+        In which the device computes.
     """
 
     _inner: _armrs.OnlineCompensation
 
-    def __init__(self, model: Model | str | os.PathLike[str], identified: str | os.PathLike[str] | None = None) -> None:
+    def __init__(
+        self,
+        model: Model | str | os.PathLike[str],
+        identified: str | os.PathLike[str] | None = None,
+        *,
+        precision: str = "double",
+    ) -> None:
+        checks.choice("precision", precision, PRECISIONS)
         self.model = checks.loaded("model", model, Model, load_model)
-        self._inner = _armrs.OnlineCompensation(_armrs.Rig(self.model), standard_deviations(self.model, identified))
+        covariance = covariance_of(self.model, identified).tolist()
+        self._inner = _armrs.OnlineCompensation(_armrs.Rig(self.model), covariance, precision)
 
     def __repr__(self) -> str:
         return f"Compensation({self.model.n_joints} joints)"

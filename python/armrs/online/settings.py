@@ -12,6 +12,8 @@ from ..errors import unknown_name
 from ..model import Model, load_model
 
 PerJoint = tuple[float, ...]
+PRECISIONS = ("double", "single")
+"""Of the libraries for C."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class Settings:
         Farthest that the carrying torque may be from that of the arm as given, by joint [N m].
     forgetting : float
         Time in which what was learned fades while the arm moves [s].
+    precision : {"double", "single"}
+        In which the device computes.
     """
 
     period: float
@@ -62,8 +66,10 @@ class Settings:
     frozen_after: float
     envelope: PerJoint
     forgetting: float
+    precision: str = "double"
 
     def __post_init__(self) -> None:
+        checks.choice("precision", self.precision, PRECISIONS)
         numbers = ("period", "cutoff", "window", "dead_band", "fastest", "steepest", "largest_force", "largest_torque", "gate")
         for name in (*numbers, "frozen_after", "forgetting"):
             value = checks.samples(name, getattr(self, name), shape=())
@@ -82,7 +88,7 @@ class Settings:
         return dataclasses.replace(self, **changes)
 
 
-def default_settings(model: Model | str | os.PathLike[str], period: float) -> Settings:
+def default_settings(model: Model | str | os.PathLike[str], period: float, precision: str = "double") -> Settings:
     """Return the settings that `armrs_estimator_settings` gives for an arm and a control period: every guard is on.
 
     Parameters
@@ -91,6 +97,8 @@ def default_settings(model: Model | str | os.PathLike[str], period: float) -> Se
         Two or three segments.
     period : float
         Control period [s].
+    precision : {"double", "single"}
+        In which the device computes: "single" for a Cortex-M4F, with the bits that it has.
 
     Examples
     --------
@@ -100,5 +108,6 @@ def default_settings(model: Model | str | os.PathLike[str], period: float) -> Se
     """
     loaded = checks.loaded("model", model, Model, load_model)
     period = checks.number("period", period, above=0.0, unit="s")
-    told = _armrs.online_settings(_armrs.Rig(loaded), period)
-    return Settings(**told)  # type: ignore[arg-type]
+    checks.choice("precision", precision, PRECISIONS)
+    told = _armrs.online_settings(_armrs.Rig(loaded), period, precision)
+    return Settings(**told, precision=precision)  # type: ignore[arg-type]

@@ -73,8 +73,8 @@ def export_c(
     precision : {"double", "single"}
         Of the library that the firmware links.
     identified : path, optional
-        `identified.json` of the model, for the standard deviations. Without it those of the segments follow from
-        `segment_uncertainty`, and effects count as exact.
+        `identified.json` of the model, for standard deviations and correlations. Without it standard deviations of the segments follow
+        from `segment_uncertainty`, and effects count as exact.
 
     Raises
     ------
@@ -92,8 +92,8 @@ def export_c(
     vectors = _vectors(loaded.n_joints)
     told = _armrs.firmware(_armrs.Rig(loaded), loaded.segment_uncertainty, vectors.tolist())
     effects = [e for e, acts_on in zip(loaded.all_effects, told["acts_on"], strict=True) if acts_on != "sensors"]
-    sd = _deviations(loaded, told, identified)
-    parts = _Parts(loaded, precision, digest, told, effects, sd, vectors)
+    covariance = _covariance(loaded, told, identified)
+    parts = _Parts(loaded, precision, digest, told, effects, covariance, vectors)
     return FirmwareSource(parts.header(), parts.source(), vectors, np.array(told["torques"]), digest)
 
 
@@ -108,9 +108,9 @@ def _vectors(joints: int) -> np.ndarray:
     return vectors.astype(np.float32).astype(np.float64)
 
 
-def standard_deviations(model: Model, identified: str | os.PathLike[str] | None = None) -> list[float]:
-    """Return the standard deviations that `export_c` writes, one an unknown."""
-    return _deviations(model, _told(model), identified)
+def covariance_of(model: Model, identified: str | os.PathLike[str] | None = None) -> np.ndarray:
+    """Return the covariance of the unknowns that `export_c` writes, shape (n_unknowns, n_unknowns)."""
+    return _covariance(model, _told(model), identified)
 
 
 def unknowns_of(model: Model) -> list[tuple[str, int, str]]:
@@ -130,18 +130,30 @@ def _linear(model: Model, told: _Firmware) -> list[tuple[Effect, Any]]:
     return [(e, p) for e in acting for p in catalogue()[e.kind].parameters if p.linear]
 
 
-def _deviations(model: Model, told: _Firmware, path: str | os.PathLike[str] | None) -> list[float]:
-    """Return the standard deviation of each unknown: of the base parameters, then of the linear parameters of the effects."""
+def _covariance(model: Model, told: _Firmware, path: str | os.PathLike[str] | None) -> np.ndarray:
+    """Return the covariance of the unknowns: the base parameters, then the linear parameters of the effects."""
     base = 2 * model.n_joints
     linear = _linear(model, told)
     if path is None:
-        return [*told["sd"][:base], *(0.0 for _ in linear)]
+        return np.diag(np.square([*told["sd"][:base], *(0.0 for _ in linear)]))
     result = _result(checks.path("identified", path))
-    found = [e["std"] for e in result["combinations"]]
-    if len(found) != base:
-        raise BadInput("combinations", Text(f"{len(found)} of them"), f"{base} for {model.n_joints} segments", file=Path(path))
-    by_joint = {(e["kind"], e["joint"]): e["std"] for e in result["parameters"]}
-    return [*found, *(by_joint.get((e.kind, e.joint), 0.0) for e, _ in linear)]
+    combinations = result["combinations"]
+    if len(combinations) != base:
+        raise BadInput("combinations", Text(f"{len(combinations)} of them"), f"{base} for {model.n_joints} segments", file=Path(path))
+    known = {(e["kind"], e["joint"], e["name"]): e["std"] for e in result["parameters"]}
+    sd = np.array([e["std"] for e in combinations] + [known.get((e.kind, e.joint, p.name), 0.0) for e, p in linear])
+    names = [e["name"] for e in combinations] + [f"{e.kind}{e.joint} {p.name}" for e, p in linear]
+    return np.outer(sd, sd) * _correlations(result, names)
+
+
+def _correlations(result: dict[str, Any], names: list[str]) -> np.ndarray:
+    """Return the correlations between quantities; those that were not identified together have none."""
+    places = {name: place for place, name in enumerate(result.get("correlated", []))}
+    between = np.eye(len(names))
+    for i, k in np.ndindex(between.shape):
+        if i != k and names[i] in places and names[k] in places:
+            between[i, k] = result["correlations"][places[names[i]]][places[names[k]]]
+    return between
 
 
 def _result(path: Path) -> dict[str, Any]:
@@ -174,11 +186,11 @@ class _Parts:
         digest: str,
         told: _Firmware,
         effects: list[Effect],
-        sd: list[float],
+        covariance: np.ndarray,
         vectors: np.ndarray,
     ) -> None:
         self.model, self.precision, self.digest, self.told = model, precision, digest, told
-        self.effects, self.sd, self.vectors = effects, sd, vectors
+        self.effects, self.covariance, self.vectors = effects, covariance, vectors
 
     def _guards(self) -> str:
         wrong = "ifndef" if self.precision == "single" else "ifdef"
@@ -214,7 +226,7 @@ extern "C" {{
 /* Makes the arm with its effects. */
 ARMRS_MUST_USE armrs_status armrs_model_arm(armrs_arm *arm, armrs_problem *problem);
 
-/* Makes what carries it, with the standard deviations of its unknowns; correlations are taken as zero. */
+/* Makes what carries it, with the covariance of its unknowns. */
 ARMRS_MUST_USE armrs_status armrs_model_compensation(armrs_compensation *compensation, const armrs_arm *arm, armrs_problem *problem);
 
 /* Takes the errors of the sensors out of readings: angles [rad], force [N] and moment [N m] on the arm. */
@@ -286,13 +298,19 @@ armrs_status armrs_model_arm(armrs_arm *arm, armrs_problem *problem) {{
 
     def _compensation(self) -> str:
         padded = [*self.told["values"], *[0.0] * (18 - len(self.told["values"]))]
-        sd = [*self.sd, *[0.0] * (18 - len(self.sd))]
+        unknowns = len(self.covariance)
+        # Of a symmetric matrix what is below and on the diagonal.
+        lower = [self.covariance[i, k] for i in range(unknowns) for k in range(i + 1)]
         return f"""armrs_status armrs_model_compensation(armrs_compensation *compensation, const armrs_arm *arm, armrs_problem *problem) {{
   static const armrs_real values[ARMRS_UNKNOWNS] = {_row(padded)};
-  static const armrs_real sd[ARMRS_UNKNOWNS] = {_row(sd)};
+  /* Of the unknowns in use, by rows up to the diagonal. */
+  static const armrs_real lower[{len(lower)}] = {_row(lower)};
   armrs_real covariance[ARMRS_UNKNOWNS * ARMRS_UNKNOWNS];
+  const armrs_real *next = lower;
   for (size_t i = 0; i < ARMRS_UNKNOWNS * ARMRS_UNKNOWNS; i++) covariance[i] = 0;
-  for (size_t i = 0; i < ARMRS_UNKNOWNS; i++) covariance[i * (ARMRS_UNKNOWNS + 1)] = sd[i] * sd[i];
+  for (size_t i = 0; i < {unknowns}; i++) {{
+    for (size_t k = 0; k <= i; k++) covariance[i * ARMRS_UNKNOWNS + k] = *next++;
+  }}
   return armrs_compensation_init(compensation, arm, values, covariance, problem);
 }}
 """

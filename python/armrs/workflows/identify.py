@@ -47,6 +47,11 @@ class Identified(Tabular, Series):
         The base parameters: what a planar chain can show at all.
     calibration : tuple of Estimate
         Small imperfections of the measurement that were refitted within the declared tolerance.
+    correlated : tuple of str
+        Names of the quantities between which `correlations` are: the combinations, then parameters of effects ("coulomb1 torque").
+        Empty by the cascade, which fits each joint by itself.
+    correlations : ndarray, shape (n_correlated, n_correlated)
+        Correlations of their errors.
     contradictions : tuple of str
         What in the result cannot be true of this arm and these sensors: a mass at its limit, a calibration far beyond its tolerance,
         a torque that is not described at all. Then no number is to be trusted.
@@ -117,6 +122,17 @@ class Identified(Tabular, Series):
     def calibration(self) -> tuple[Estimate, ...]:
         """Small imperfections of the measurement that were refitted."""
         return self.result.calibration
+
+    @property
+    def correlated(self) -> tuple[str, ...]:
+        """Names of the quantities between which `correlations` are."""
+        return self.result.correlated
+
+    @cached_property
+    def correlations(self) -> np.ndarray:
+        """Correlations of the errors of `correlated`."""
+        count = len(self.correlated)
+        return np.array(self.result.correlations).reshape(count, count)
 
     @property
     def contradictions(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..model import Model, Robot
-from .firmware import standard_deviations
+from .firmware import covariance_of
 
 if TYPE_CHECKING:
     from .._armrs import _Yielded, _Yielding
@@ -141,7 +141,7 @@ class Support:
 
     def core(self) -> tuple[_armrs.OnlineCompensation, float, float]:
         """Return it as the core takes it."""
-        compensation = _armrs.OnlineCompensation(_armrs.Rig(self.model), standard_deviations(self.model))
+        compensation = _armrs.OnlineCompensation(_armrs.Rig(self.model), covariance_of(self.model).tolist(), "double")
         return compensation, self.share, self.limit_Nm
 
 
@@ -214,7 +214,7 @@ def endpoint_stiffness(model: Model, q: np.ndarray) -> np.ndarray:
     """
     if model.n_joints != 2:
         raise BadInput("model", Text(f"{model.n_joints} segments"), "2: a tip in a plane does not tell how three joints move")
-    arm, carried = _armrs.Arm.from_model(model), _armrs.OnlineCompensation(_armrs.Rig(model), standard_deviations(model))
+    arm, carried = _armrs.Arm.from_model(model), _armrs.OnlineCompensation(_armrs.Rig(model), covariance_of(model).tolist(), "double")
 
     def holding(angles: np.ndarray) -> np.ndarray:
         torque, _ = carried.carry(np.zeros(1), angles[None], np.zeros((1, 2)))

@@ -26,8 +26,6 @@ pub(super) enum Work {
     Publish,
     /// To say how certain as many unknowns are as there are joints, from this one on.
     Deviations(usize),
-    /// To exchange the covariance.
-    Covariance,
 }
 
 impl Work {
@@ -45,7 +43,7 @@ impl Work {
             Self::Wait(_) => usize::MAX,
             Self::Row(_) => 20 * p + rotation(0) - rotation(split(p)),
             Self::Rest(_) => rotation(split(p)),
-            Self::Copy | Self::Covariance => 4 * p * p,
+            Self::Copy => 4 * p * p,
             Self::Solve => 6 * p * p + 36 * p,
             Self::Fix { unknown, .. } => rotation(unknown + 1) + 40 * p,
             Self::Publish => 40 * n * p,
@@ -112,6 +110,5 @@ fn periods_taken(size: [usize; 2], budget: usize) -> u32 {
     for unknown in (0..p).step_by(n.max(1)) {
         take(Work::Deviations(unknown));
     }
-    take(Work::Covariance);
     periods
 }

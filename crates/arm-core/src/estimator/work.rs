@@ -75,13 +75,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 if first + N < P {
                     Work::Deviations(first + N)
                 } else {
-                    Work::Covariance
+                    // The last rows are short, which leaves time for this.
+                    self.covariance.rows = self.bounded.u;
+                    self.covariance.variances = self.information.d.map(|d| T::ONE / d);
+                    Work::Idle
                 }
-            }
-            Work::Covariance => {
-                self.covariance.rows = self.bounded.u;
-                self.covariance.variances = self.information.d.map(|d| T::ONE / d);
-                Work::Idle
             }
         }
     }

@@ -61,6 +61,8 @@ pub(super) fn summarise<const N: usize>(
     };
     let (chain, fitted) = updated(model, unknowns, x)?;
     Ok(Identified {
+        correlated: Vec::new(),
+        correlations: Vec::new(),
         status: steps
             .iter()
             .map(|s| s.status)

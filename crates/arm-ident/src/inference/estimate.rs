@@ -84,6 +84,11 @@ pub struct Identified<const N: usize> {
     pub combinations: Vec<Estimate>,
     /// Calibrations that were refitted within their tolerance.
     pub calibration: Vec<Estimate>,
+    /// Names of the quantities between which `correlations` are: the combinations, then the parameters of effects as
+    /// [`Unknown::printed`](crate::regression::unknown::Unknown::printed). None where each joint was fitted by itself.
+    pub correlated: Vec<String>,
+    /// Correlations of their errors, by rows.
+    pub correlations: Vec<Vec<f64>>,
     /// In words: which unknowns trade against each other.
     pub trades: Vec<String>,
     /// Whether no torque acted, so that all parameters are known up to one common factor only.

@@ -109,12 +109,21 @@ pub(crate) fn summarise<const N: usize>(
         .map(|u| certainty.unknown(u))
         .collect::<Result<_, _>>()?;
     let mut combinations = Vec::new();
-    for (i, (weights, _)) in base_parameters(unknowns, fit.model).iter().enumerate() {
+    let (mut correlated, mut weighed) = (Vec::new(), Vec::new());
+    for (i, (weights, _)) in base_parameters(unknowns, fit.model).into_iter().enumerate() {
         let (name, unit) = base_name::<N>(i);
+        correlated.push(name.clone());
         combinations.push(Estimate {
             joint: Some(i % N + 1),
-            ..certainty.linear(weights, name, unit)?
+            ..certainty.linear(&weights, name, unit)?
         });
+        weighed.push(weights);
+    }
+    for (u, unknown) in unknowns.iter().enumerate() {
+        if let Source::Effect(..) = unknown.source {
+            correlated.push(unknown.printed());
+            weighed.push(unit_vector(unknowns.len(), u));
+        }
     }
     Ok(Identified {
         status: solved.outcome.status,
@@ -123,6 +132,8 @@ pub(crate) fn summarise<const N: usize>(
         parameters,
         combinations,
         calibration,
+        correlations: certainty.correlations(&weighed),
+        correlated,
         trades,
         scale_free: fit.scale_free,
         cutoff,
@@ -186,7 +197,7 @@ fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Spr
     if bounds {
         binding.extend(solved.binding.iter().cloned());
         for u in (0..p).filter(|&u| solved.outcome.active[u] != 0) {
-            binding.push((0..p).map(|i| if i == u { 1.0 } else { 0.0 }).collect());
+            binding.push(unit_vector(p, u));
         }
     }
     let bread = SandwichCovariance::new(&solved.posterior.r, &binding)?;
@@ -220,8 +231,7 @@ fn covariance(solved: &Solved, unknowns: &[Unknown], bounds: bool) -> Result<Spr
 
 impl Certainty<'_> {
     pub(crate) fn unknown(&self, u: usize) -> Result<Estimate, IdentError> {
-        let mut w = vec![0.0; self.unknowns.len()];
-        w[u] = 1.0;
+        let w = unit_vector(self.unknowns.len(), u);
         let unknown = &self.unknowns[u];
         let estimate = self.linear(&w, unknown.name.clone(), unknown.unit)?;
         Ok(Estimate {
@@ -268,6 +278,30 @@ impl Certainty<'_> {
             decided_by,
             caveat: None,
         })
+    }
+
+    /// Correlations between the errors of linear functions of the unknowns. One that a bound holds goes with no other.
+    fn correlations(&self, functions: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let (whole, p) = (&self.covariance.whole, self.x.len());
+        let covariance = |a: &[f64], b: &[f64]| {
+            let spread: Vec<f64> = (0..p)
+                .map(|i| (0..p).map(|k| whole[(i, k)] * b[k]).sum())
+                .collect();
+            dot(a, &spread) + self.scale_sd * self.scale_sd * dot(a, self.x) * dot(b, self.x)
+        };
+        let sd: Vec<f64> = functions
+            .iter()
+            .map(|w| libm::sqrt(covariance(w, w).max(0.0)))
+            .collect();
+        let between = |i: usize, k: usize| match sd[i] * sd[k] {
+            _ if i == k => 1.0,
+            product if product > 0.0 => covariance(&functions[i], &functions[k]) / product,
+            _ => 0.0,
+        };
+        (0..functions.len())
+            .map(|i| (0..functions.len()).map(|k| between(i, k)).collect())
+            .collect()
     }
 
     /// Half width of an interval in standard deviations: of so many degrees of freedom as a sum of two variances has of which one
@@ -324,6 +358,12 @@ impl Certainty<'_> {
         }
         Ok(estimate)
     }
+}
+
+fn unit_vector(length: usize, place: usize) -> Vec<f64> {
+    (0..length)
+        .map(|i| if i == place { 1.0 } else { 0.0 })
+        .collect()
 }
 
 /// The rest angle of a fitted spring; none for a spring whose amplitude may be zero, which rests anywhere.

@@ -132,6 +132,10 @@ result_class! {
         combinations: Vec<core::Estimate>, "";
         /// Small imperfections of the measurement that were refitted within the declared tolerance.
         calibration: Vec<core::Estimate>, "";
+        /// Names of the quantities between which `correlations` are; none where each joint was fitted by itself.
+        correlated: Vec<String>, "";
+        /// Correlations of the errors of the combinations and of the parameters of effects, by rows.
+        correlations: Vec<Vec<f64>>, "";
         /// What in the result cannot be true of this arm and these sensors.
         contradictions: Vec<String>, "";
         /// What the fitted model does not describe well, and speeds that are noise.
