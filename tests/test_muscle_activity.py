@@ -13,7 +13,7 @@ import pytest
 
 import armrs
 from armrs.analysis import repeated
-from armrs.io.muscle_activity import co_contraction, comparable, mark_activity
+from armrs.io.muscle_activity import co_contraction, comparable, joint_activity, mark_activity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import check_passive
@@ -169,3 +169,145 @@ def test_a_data_set_without_or_with_dead_channels_is_as_it_was(share: float) -> 
     plain = armrs.Trial(one.file, one.configuration, 1, "fit", one.t, one.q, force_on_arm=one.force_on_arm, emg=kept)
     marked, lines = mark_activity([plain])
     assert marked[0].valid.all() and lines == []
+
+
+MUSCLES = (armrs.model.Muscle("emg_elbow_flexor_uV", 1, mvc=50.0, rest=2.0, delay_s=0.0), armrs.model.Muscle("emg_other", 1))
+
+
+def test_activity_is_the_envelope_above_rest_relative_to_a_maximal_contraction() -> None:
+    t = np.arange(3000) / 100.0
+    step = np.where((t > 10.0) & (t < 12.0), 26.0, 2.0)
+    one = armrs.Trial("a.csv", "a", 1, "fit", t, np.zeros((len(t), 2)), emg={"emg_elbow_flexor_uV": step, "emg_other": 2.0 * step})
+    (told,), lines = joint_activity([one], MUSCLES[:1], 2)
+    assert told.activity is not None and lines == []
+    assert told.activity[(t > 10.2) & (t < 11.8)] == pytest.approx(np.tile([0.5, 0.0], (159, 1)))
+    assert not told.activity[(t < 9.8) | (t > 12.2)].any()
+    # As late as torque.
+    (late,), _ = joint_activity([one], [MUSCLES[0].replace(delay_s=0.1)], 2)
+    assert late.activity is not None
+    assert late.activity[10:] == pytest.approx(told.activity[:-10])
+    # The mean of both; the other one, of which nothing is known, is at its largest.
+    (both,), lines = joint_activity([one], MUSCLES, 2)
+    assert both.activity is not None
+    assert both.activity[1100] == pytest.approx([0.75, 0.0])
+    assert len(lines) == 1 and "emg_other: no mvc" in lines[0]
+    assert joint_activity([one], (), 2)[0][0].activity is None
+
+
+def test_co_contraction_is_relative_to_contractions_that_are_stated() -> None:
+    on = np.where((np.arange(1000) > 400) & (np.arange(1000) < 600), 5.0, 1.0)
+    # Of an extensor that could be three times as active it is a third.
+    stated = (armrs.model.Muscle("emg_elbow_extensor_uV", 1, mvc=13.0, rest=1.0),)
+    assert co_contraction([pair(on, on)], 0, 4.0, 6.0, stated) == pytest.approx(2.0 * (1.0 / 3.0) / (4.0 / 3.0), abs=0.01)
+
+
+def active_session(seed: int, muscles: bool = True) -> armrs.Dataset:
+    """A dynamometer turns two joints; the elbow's muscles contract now and then. What they do is written here anew."""
+    draw = np.random.default_rng(seed)
+    segments = MODEL.segments
+    model = armrs.Model(segments, (armrs.Joint("shoulder", viscosity=0.25), armrs.Joint("elbow", viscosity=0.2, stiffness=0.5, rest=0.6)))
+    arm, trials = armrs.Arm(*([getattr(s, name) for s in segments] for name in ("length", "mass", "com", "inertia"))), []
+    t = np.arange(0.0, 10.0, 0.01)
+    for repeat in (1, 2, 3):
+        omega, phase = np.array([1.3, 2.1]), draw.uniform(0.0, 6.0, 2)
+        q = np.array([-0.8, 1.2]) + 0.5 * np.sin(omega * t[:, None] + phase)
+        qd, qdd = 0.5 * omega * np.cos(omega * t[:, None] + phase), -0.5 * omega**2 * np.sin(omega * t[:, None] + phase)
+        u = sum(0.3 * np.exp(-(((t - at) / 0.4) ** 2)) for at in draw.uniform(1.0, 9.0, 3))
+        tau = arm.inverse_dynamics(q, qd, qdd) + np.array([0.25, 0.2]) * qd
+        tau[:, 1] += 0.5 * (q[:, 1] - 0.6) + u * (8.0 * q[:, 1] - 5.0 + 0.9 * qd[:, 1])
+        # 2 µV at rest, 80 µV in a maximal contraction; torque 50 ms later.
+        envelope = 2.0 + 78.0 * np.interp(t + 0.05, t, u)
+        noisy = tau + 0.02 * draw.standard_normal(tau.shape), q + 1e-4 * draw.standard_normal(q.shape)
+        trials.append(armrs.Trial(f"{repeat}.csv", "swing", repeat, "fit", t, noisy[1], tau=noisy[0], emg={"emg_biceps_uV": envelope}))
+    stated = (armrs.model.Muscle("emg_biceps_uV", 2, mvc=80.0, rest=2.0),) if muscles else ()
+    marked = joint_activity(mark_activity(trials)[0], stated, 2)[0]
+    return armrs.Dataset("active", model, marked, muscles=stated)
+
+
+ACTIVE = ("active_stiffness", "active_viscosity")
+
+
+def test_stiffness_and_viscosity_that_grow_with_activity_are_identified() -> None:
+    truth = {("stiffness", "active_stiffness"): 8.0, ("torque", "active_stiffness"): 5.0, ("viscosity", "active_viscosity"): 0.9}
+    inside = []
+    for seed in range(400, 410):
+        data = active_session(seed)
+        assert any(t.active.any() for t in data.trials)
+        found = armrs.identify(data, with_effects=ACTIVE, motion="measured")
+        estimates = {(p.name, p.kind): p for p in found.parameters if p.kind in ACTIVE}
+        # The shoulder has no muscle that is recorded.
+        assert set(estimates) == set(truth) and all(p.joint == 2 for p in estimates.values())
+        for key, true in truth.items():
+            assert estimates[key].value == pytest.approx(true, rel=0.05)
+            inside.append(estimates[key].interval[0] <= true <= estimates[key].interval[1])
+        passive = {(p.name, p.kind): p.value for p in found.parameters if p.joint == 2}
+        assert passive["stiffness", "elastic"] == pytest.approx(0.5, rel=0.1)
+    assert np.mean(inside) >= 0.8
+
+
+def test_activity_that_no_effect_depends_on_changes_nothing() -> None:
+    with_muscles, without = (armrs.identify(active_session(400, muscles), motion="measured") for muscles in (True, False))
+    assert [p.value for p in with_muscles.parameters] == [p.value for p in without.parameters]
+
+
+def test_what_depends_on_activity_needs_muscles_and_repeats_are_not_compared_with_it(tmp_path: Path) -> None:
+    data = active_session(400, muscles=False)
+    with pytest.raises(armrs.BadInput, match=r"\[\[muscle\]\]: no muscle of joint 1"):
+        armrs.identify(data, with_effects=ACTIVE, motion="measured")
+    effect = armrs.Effect("active_stiffness", 2, parameters={"stiffness": 8.0, "torque": 5.0})
+    told = active_session(400)
+    model = told.model.replace(effects=(effect,))
+    with pytest.raises(armrs.BadInput, match="no two have the same muscle activity"):
+        armrs.gap(told.replace(model=model))
+    with pytest.raises(armrs.BadInput, match="identify and simulate alone follow it"):
+        armrs.simulate(model, data.trials[0], duration=1.0)
+    with pytest.raises(armrs.BadInput, match="identify and simulate alone follow it"):
+        armrs.simulate(model, MOVEMENT)
+    wrong = told.model.replace(effects=(effect.replace(joint=1),))
+    with pytest.raises(armrs.BadInput, match="no muscle of joint 1"):
+        armrs.identify(told.replace(model=wrong), motion="measured")
+
+
+def test_a_simulated_arm_is_moved_by_its_muscles() -> None:
+    """Forward, with the laws of the catalogue, an arm follows the torques that were computed inversely with those written here."""
+    data = active_session(401)
+    effects = (
+        armrs.Effect("active_stiffness", 2, parameters={"stiffness": 8.0, "torque": 5.0}),
+        armrs.Effect("active_viscosity", 2, parameters={"viscosity": 0.9}),
+    )
+    one = data.trials[0]
+    active = armrs.simulate(data.model.replace(effects=effects), one, duration=1.5, rate=100.0)
+    passive = armrs.simulate(data.model, one, duration=1.5, rate=100.0)
+    size = len(active.t)
+    off = [np.abs(run.q - one.q[:size]).max() for run in (active, passive)]
+    assert off[0] < 0.02 and off[1] > 5.0 * off[0]
+
+
+def test_muscles_of_a_data_set_are_written_read_and_refused(tmp_path: Path) -> None:
+    data = active_session(400)
+    armrs.write_dataset(data, tmp_path)
+    again = armrs.load_dataset(tmp_path)
+    assert again.muscles == data.muscles
+    for one, other in zip(again.trials, data.trials, strict=True):
+        np.testing.assert_allclose(one.activity, other.activity, atol=1e-9)
+    file = tmp_path / "dataset.toml"
+    text = file.read_text(encoding="utf-8")
+    for old, new, message in (
+        ("joint = 2", "joint = 3", r"\[\[muscle\]\] 1, joint: found 3"),
+        (
+            'channel = "emg_biceps_uV"',
+            'channel = "emg_triceps"',
+            r"\[\[muscle\]\] 1, channel: found no such column in 1.csv.*emg_biceps_uV",
+        ),
+        ('channel = "emg_biceps_uV"', 'channel = "biceps"', r"\[\[muscle\]\] 1, channel: found .*the name of an emg_ column"),
+        ("mvc = 80.0", "mvc = 1.0", r"\[\[muscle\]\] 1, mvc: found 1.*above rest = 2"),
+        ("delay_s = 0.05", "delay_s = 5.0", r"\[\[muscle\]\] 1, delay_s: found 5.*0 to 0.5"),
+    ):
+        assert old in text
+        file.write_text(text.replace(old, new), encoding="utf-8")
+        with pytest.raises(armrs.BadInput, match=message):
+            armrs.load_dataset(tmp_path)
+    table = text[text.index("[[muscle]]") : text.index("[[trial]]")]
+    file.write_text(text.replace(table, table + table), encoding="utf-8")
+    with pytest.raises(armrs.BadInput, match=r"\[\[muscle\]\] 2, channel: .*each channel once"):
+        armrs.load_dataset(tmp_path)

@@ -1,4 +1,4 @@
-//! `Tolerance`, `Subject`, `AddedMass`, `TrialEntry` and `Description`.
+//! `Tolerance`, `Subject`, `AddedMass`, `Muscle`, `TrialEntry` and `Description`.
 
 use std::path::PathBuf;
 
@@ -272,6 +272,96 @@ value_class!(
     ]
 );
 
+/// A muscle whose activity a channel tells, and the joint that it moves.
+///
+/// Parameters
+/// ----------
+/// channel : str
+///     Name of its column, `emg_…`.
+/// joint : int
+///     Number of the joint, from 1.
+/// mvc : float, optional
+///     Envelope of a maximal voluntary contraction, in the unit of the channel; without it the largest of the session.
+/// rest : float, optional
+///     Envelope at rest, in the unit of the channel; without it the median of the session.
+/// delay_s : float, default 0.05
+///     By how much torque follows activity [s].
+///
+/// Raises
+/// ------
+/// BadInput
+///     For a value out of bounds, with the bounds.
+///
+/// Examples
+/// --------
+/// >>> from armrs.model import Muscle
+/// >>> Muscle("emg_biceps_uV", 2, mvc=850.0).delay_s
+/// 0.05
+#[pyclass(frozen, eq, hash, module = "armrs.model")]
+#[derive(Clone)]
+pub struct Muscle(pub arm_model::Muscle);
+
+#[pymethods]
+impl Muscle {
+    #[new]
+    #[pyo3(
+        signature = (channel, joint, mvc=None, rest=None, delay_s=None),
+        text_signature = "(channel, joint, mvc=None, rest=None, delay_s=0.05)"
+    )]
+    fn new(
+        channel: Any<'_, '_>,
+        joint: Any<'_, '_>,
+        mvc: Option<Any<'_, '_>>,
+        rest: Option<Any<'_, '_>>,
+        delay_s: Option<Any<'_, '_>>,
+    ) -> PyResult<Self> {
+        let given = [
+            ("channel", Some(channel)),
+            ("joint", Some(joint)),
+            ("mvc", mvc),
+            ("rest", rest),
+            ("delay_s", delay_s),
+        ];
+        built("", table(given))
+    }
+    /// Name of its column.
+    #[getter]
+    fn channel(&self) -> &str {
+        &self.0.channel
+    }
+    /// Number of the joint, from 1.
+    #[getter]
+    fn joint(&self) -> i64 {
+        self.0.joint
+    }
+    /// Envelope of a maximal voluntary contraction, in the unit of the channel.
+    #[getter]
+    fn mvc(&self) -> Option<f64> {
+        self.0.mvc
+    }
+    /// Envelope at rest, in the unit of the channel.
+    #[getter]
+    fn rest(&self) -> Option<f64> {
+        self.0.rest
+    }
+    /// By how much torque follows activity [s].
+    #[getter]
+    fn delay_s(&self) -> f64 {
+        self.0.delay
+    }
+}
+
+value_class!(
+    Muscle,
+    [
+        ("channel", ""),
+        ("joint", ""),
+        ("mvc", ""),
+        ("rest", ""),
+        ("delay_s", "s")
+    ]
+);
+
 /// What `dataset.toml` says of one trial.
 ///
 /// Parameters
@@ -354,6 +444,8 @@ value_class!(
 ///     Whether the trials were simulated.
 /// added : sequence of AddedMass
 ///     Masses that are worn in some configurations besides the model.
+/// muscles : sequence of Muscle
+///     Muscles whose activity is recorded.
 ///
 /// Raises
 /// ------
@@ -367,8 +459,8 @@ pub struct Description(pub arm_model::Description);
 impl Description {
     #[new]
     #[pyo3(
-        signature = (name, model, trials, force_on=None, sample_rate=None, subject=None, tolerance=None, synthetic=None, added=None),
-        text_signature = "(name, model, trials, force_on=None, sample_rate=None, subject=Subject(), tolerance=Tolerance(), synthetic=False, added=())"
+        signature = (name, model, trials, force_on=None, sample_rate=None, subject=None, tolerance=None, synthetic=None, added=None, muscles=None),
+        text_signature = "(name, model, trials, force_on=None, sample_rate=None, subject=Subject(), tolerance=Tolerance(), synthetic=False, added=(), muscles=())"
     )]
     #[expect(
         clippy::too_many_arguments,
@@ -384,6 +476,7 @@ impl Description {
         tolerance: Option<Any<'_, '_>>,
         synthetic: Option<Any<'_, '_>>,
         added: Option<Any<'_, '_>>,
+        muscles: Option<Any<'_, '_>>,
     ) -> PyResult<Self> {
         let list = |tables: Vec<Table>| Value::List(tables.into_iter().map(Value::Table).collect());
         let trials = each("trials", trials, |entry: &TrialEntry| entry.0.to_table())?;
@@ -411,6 +504,12 @@ impl Description {
             given.push(
                 "added",
                 list(each("added", added, |a: &AddedMass| a.0.to_table())?),
+            );
+        }
+        if let Some(muscles) = muscles {
+            given.push(
+                "muscle",
+                list(each("muscles", muscles, |m: &Muscle| m.0.to_table())?),
             );
         }
         built("", given.into())
@@ -482,6 +581,12 @@ impl Description {
         let added = self.0.added.iter().cloned().map(AddedMass);
         PyTuple::new(py, added.collect::<Vec<_>>())
     }
+    /// Muscles whose activity is recorded.
+    #[getter]
+    fn muscles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let muscles = self.0.muscles.iter().cloned().map(Muscle);
+        PyTuple::new(py, muscles.collect::<Vec<_>>())
+    }
 }
 
 value_class!(
@@ -495,8 +600,16 @@ value_class!(
         ("subject", ""),
         ("tolerance", ""),
         ("synthetic", ""),
-        ("added", "")
+        ("added", ""),
+        ("muscles", "")
     ]
 );
 
-wraps!(Tolerance, Subject, AddedMass, TrialEntry, Description);
+wraps!(
+    Tolerance,
+    Subject,
+    AddedMass,
+    Muscle,
+    TrialEntry,
+    Description
+);

@@ -9,7 +9,7 @@ mod value;
 mod whole;
 
 pub(crate) use class::{Attribute, Wraps, reduced, replaced, shown};
-pub use dataset::{AddedMass, Description, Subject, Tolerance, TrialEntry};
+pub use dataset::{AddedMass, Description, Muscle, Subject, Tolerance, TrialEntry};
 pub use effect::Effect;
 pub use parameter::{ParameterId, ParameterInfo};
 pub use parts::{Contact, Joint, Robot, Segment};
@@ -30,6 +30,7 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<Tolerance>()?;
     m.add_class::<Subject>()?;
     m.add_class::<AddedMass>()?;
+    m.add_class::<Muscle>()?;
     m.add_class::<TrialEntry>()?;
     m.add_class::<Description>()?;
     m.add_function(wrap_pyfunction!(load_model, m)?)
