@@ -482,10 +482,8 @@ mod tests {
         // The scatter is that of whole repeats.
         let all = [&a, &b, &repeat(&whole, course(-3.0))];
         let complete = repeat_deviations::<1>(&all).expect("shared samples");
-        assert_eq!(
-            second_moments::<1>(&deviations),
-            second_moments::<1>(&complete)
-        );
+        let scatter = [&deviations, &complete].map(|d| second_moments::<1>(d)[0][0]);
+        assert!((scatter[0] - scatter[1]).abs() < 1e-12);
         assert!(repeat_deviations::<1>(&[&a, &c]).is_none());
     }
 }
