@@ -34,7 +34,7 @@ _MOST_SEGMENTS = 3
 
 _CHANNELS = {
     "q": ("joint", "rad"), "dq": ("joint", "rad/s"), "tau": ("joint", "N m"), "force_on_arm": ("axis", "N"), "base": ("axis", "m"),
-    "moment_on_arm": ("", "N m"), "robot_q": ("robot_joint", "rad"),
+    "moment_on_arm": ("", "N m"), "robot_q": ("robot_joint", "rad"), "activity": ("joint", "1"),
 }  # fmt: skip
 """What trials hold: the dimension beside that of samples, and the unit."""
 
