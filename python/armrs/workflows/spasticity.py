@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..analysis import stretches
+from ..analysis.directions import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
 from ..analysis.stretches import Reflex, Stretch
 from ..analysis.uncertainty import Deviations, angle_errors, sensitivity
@@ -24,7 +25,7 @@ from ..model import Model
 from ..tabular import Tabular, Tidy
 from ..telling import telling
 from .identify import Estimate
-from .passive import LEAST_RANGE, TrialMoments, trial_moments
+from .passive import TrialMoments, trial_moments
 
 DEFAULT_CUTOFF = 4.0
 """Cutoff of the low-pass [Hz]: above it, inertia times the noise of angles would be taken for latency (0.05° gave 6 ms at 8 Hz)."""
