@@ -58,17 +58,7 @@ fn torques_in_the_head() {
         proximal_q: 2.0,
         ..at(1.0)
     };
-    let active = Local {
-        activity: 0.5,
-        ..moving(3.0)
-    };
-    let pulled = Local { q: 2.0, ..active };
     for (name, values, local, expected) in [
-        ("active_viscosity", &[2.0][..], active, 3.0),
-        ("active_viscosity", &[2.0], moving(3.0), 0.0),
-        ("active_stiffness", &[5.0, 4.0], pulled, 3.0),
-        ("active_stiffness", &[5.0, 4.0], active, -2.0),
-        ("active_stiffness", &[5.0, 4.0], at(2.0), 0.0),
         ("viscous", &[2.0][..], moving(3.0), 6.0),
         ("viscous", &[2.0], at(3.0), 0.0),
         ("coulomb", &[0.5], moving(1.0), 0.5),
@@ -206,7 +196,6 @@ fn friction_takes_energy_at_every_speed() {
         "quadratic_drag",
         "stretch_reflex",
         "thixotropy",
-        "active_viscosity",
     ] {
         let kind = Kind::named(name).expect("a kind");
         for _ in 0..1000 {
@@ -216,7 +205,6 @@ fn friction_takes_energy_at_every_speed() {
             }
             let local = Local {
                 joint_force: 10.0,
-                activity: 0.5,
                 ..moving(random.uniform(-3.0, 3.0))
             };
             assert!(effect.torque(&local) * local.qd >= 0.0, "{name}");

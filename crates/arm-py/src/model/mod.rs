@@ -3,14 +3,16 @@
 mod class;
 mod dataset;
 mod effect;
+mod muscle;
 mod parameter;
 mod parts;
 mod value;
 mod whole;
 
 pub(crate) use class::{Attribute, Wraps, reduced, replaced, shown};
-pub use dataset::{AddedMass, Description, Muscle, Subject, Tolerance, TrialEntry};
+pub use dataset::{AddedMass, Description, Subject, Tolerance, TrialEntry};
 pub use effect::Effect;
+pub use muscle::Muscle;
 pub use parameter::{ParameterId, ParameterInfo};
 pub use parts::{Contact, Joint, Robot, Segment};
 pub use whole::{Model, each, load_model, one};
