@@ -516,11 +516,4 @@ value_class!(
     ]
 );
 
-wraps!(
-    Tolerance,
-    Subject,
-    AddedMass,
-    Muscle,
-    TrialEntry,
-    Description
-);
+wraps!(Tolerance, Subject, AddedMass, TrialEntry, Description);
