@@ -43,6 +43,8 @@ class Patient:
     force_gains: tuple[float, float] = (0.0, 0.0)
     force_biases: tuple[float, float] = (0.0, 0.0)
     """Errors of the laboratory's force sensor along y and z [1, N], the same in all sessions, as large as a data set declares them."""
+    person: int = 0
+    """Seed of the masses in the laboratory, the same in all sessions."""
 
     @staticmethod
     def drawn(draw: np.random.Generator) -> Patient:
@@ -56,6 +58,7 @@ class Patient:
             stiffness=draw.uniform(0.3, 1.5),
             force_gains=tuple(0.01 * draw.standard_normal(2)),
             force_biases=tuple(0.2 * draw.standard_normal(2)),
+            person=int(draw.integers(1, 2**31)),
         )
 
 
@@ -185,11 +188,12 @@ LABORATORY_SPEEDS = (0.3, 1.0, 1.8, 2.7, 3.6)
 
 def recorded(patient: Patient, seed: int) -> Dataset:
     """Return a session of the virtual laboratory."""
-    said = EXPERIMENT.format(person=PERSON, seed=seed, **dataclasses.asdict(patient))
+    values = dataclasses.asdict(patient)
+    said = EXPERIMENT.format(**values | {"person": PERSON, "seed": values["person"]})
     said += "".join(STRETCH.format(number=k, speed=s, acceleration=max(4.0, 12.0 * s)) for k, s in enumerate(LABORATORY_SPEEDS))
     for kind, values in (("gain", patient.force_gains), ("bias", patient.force_biases)):
         said += "".join(FORCE_ERROR.format(kind=kind, channel=c, value=v) for c, v in zip(("Fy", "Fz"), values, strict=True))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "EXPERIMENT.toml"
         file.write_text(said, encoding="utf-8")
-        return measure(load_experiment(file)).dataset
+        return measure(dataclasses.replace(load_experiment(file), seed=seed)).dataset

@@ -5,7 +5,8 @@
 Each patient of `tests/patients.py` (laws written there anew, tone that drifts from trial to trial, muscle activity) is drawn, and recorded
 twice. In every second one the reflex' gain is a fifth larger or smaller in the second session. Both sessions go through `armrs spasticity`
 and its history; what it calls changed is compared with the truth. With `--laboratory` it is the virtual laboratory of `armrs record` that
-records them: an arm of two segments led by a controlled robot, with cameras, a force sensor, tone and EMG.
+records them: an arm of two segments led by a controlled robot, with cameras, a force sensor, tone and EMG. There the passive stiffness of
+the last two of four patients changes too, and `armrs passive` is asked as well.
 
 Exit status: 0 when every figure holds, 1 when one does not.
 """
@@ -16,7 +17,6 @@ import argparse
 import dataclasses
 import json
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -36,18 +36,27 @@ def session(patient: patients.Patient, seed: int) -> armrs.Dataset:
     return patients.session(patient, seed, emg=True)
 
 
-def pair(number: int, seed: int, record: Callable[[patients.Patient, int], armrs.Dataset], counts: dict[str, list[bool]]) -> None:
+def pair(number: int, seed: int, laboratory: bool, counts: dict[str, list[bool]]) -> None:
     """Record one patient twice and count what was found right."""
     draw = np.random.default_rng(seed)
     first = patients.Patient.drawn(draw)
     factor = (1.0, CHANGE, 1.0, 1.0 / CHANGE)[number % 4]
-    second = dataclasses.replace(first, gain=factor * first.gain)
+    stiffer = (1.0, 1.0, CHANGE, 1.0 / CHANGE)[number % 4] if laboratory else 1.0
+    second = dataclasses.replace(first, gain=factor * first.gain, stiffness=stiffer * first.stiffness)
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "history.sqlite"
         for visit, patient in enumerate((first, second)):
-            found = armrs.spasticity(record(patient, 2 * seed + visit))
+            data, date = (patients.recorded if laboratory else session)(patient, 2 * seed + visit), f"2026-0{visit + 1}-03"
+            found = armrs.spasticity(data)
             judge(found, patient, counts)
-            courses = history.add(file, found, f"2026-0{visit + 1}-03").courses
+            courses = history.add(Path(folder) / "reflex.sqlite", found, date).courses
+            if laboratory:
+                passive = history.add(Path(folder) / "passive.sqlite", armrs.passive_moments(data), date).courses
+    if laboratory:
+        # In faster movements the reflex is in the moments. How far a joint was moved was chosen.
+        said = {c.name.split(" ")[0] for c in passive if c.changed_since_last and c.joint == 2 and "stretch 0" in c.name} - {"range"}
+        if stiffer != 1.0:
+            counts["change of the stiffness seen"].append("stiffness" in said)
+        counts["no passive moment called changed that is not"].append(not said - ({"stiffness"} if stiffer != 1.0 else set()))
     called = {c.name for c in courses if c.changed_since_last and c.joint == max(c.joint or 0 for c in courses)}
     if factor != 1.0:
         counts["change of the gain seen"].append("gain" in called)
@@ -93,9 +102,10 @@ def main() -> int:
     names = ["gain within 10 %", "threshold within 10 %", "latency within 5 ms"]
     names += [f"interval of {attribute} holds" for attribute in TRUE.values()]
     names += ["change of the gain seen", "nothing called changed where nothing is", "nothing else called changed"]
+    names += ["change of the stiffness seen", "no passive moment called changed that is not"] if options.laboratory else []
     counts |= {name: [] for name in names}
     for number in range(options.patients):
-        pair(number, options.seed + number, patients.recorded if options.laboratory else session, counts)
+        pair(number, options.seed + number, options.laboratory, counts)
     shares = {name: (sum(right), len(right)) for name, right in counts.items()}
     for name, (right, of) in shares.items():
         print(f"{name:45s} {right:4d} of {of:4d} = {right / max(of, 1):6.1%} {'' if of and holds(name, right / of) else '  short'}")

@@ -159,6 +159,18 @@ def added() -> Any:
     return table(fields, ["segment", "mass", "at"])
 
 
+def muscle() -> Any:
+    """Return the schema of a muscle whose activity is recorded."""
+    fields = {
+        "channel": {"type": "string", "pattern": "^emg_", "description": "name of its column"},
+        "joint": {"type": "integer", "minimum": 1, "description": "that it moves"},
+        "mvc": number("envelope of a maximal voluntary contraction, in the unit of the channel", above=0.0, most=1e9),
+        "rest": number("envelope at rest, in the unit of the channel", least=0.0, most=1e9),
+        "delay_s": number("by how much torque follows activity [s]", least=0.0, most=0.5, default=0.05),
+    }
+    return table(fields, ["channel", "joint"])
+
+
 def dataset() -> Any:
     """Return the schema of dataset.toml."""
     trial = {
@@ -177,6 +189,7 @@ def dataset() -> Any:
             "subject": table(subject()),
             "tolerance": tolerance(),
             "added": list_of(added()),
+            "muscle": list_of(muscle()),
             "trial": list_of(table(trial, ["file", "configuration", "role"]), least=1),
         },
         ["trial"],

@@ -147,6 +147,9 @@ def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> Non
     ]
     assert len(clinic.notes([result(warnings=list("abcdef"))])) == clinic.MOST_NOTES + 1
     assert clinic.notes([result(warnings=["slow: joint 2 moved"])]) == ["slow: elbow moved"]
+    # The same of several movements is said once: one page has no room for a line of each.
+    several = ["fast: joint 2 moved: left out", "noisy", "faster: joint 2 moved: left out", "noisy"]
+    assert clinic.notes([result(warnings=several)]) == ["fast, faster: elbow moved: left out", "noisy"]
 
 
 def test_a_slip_and_a_tremor_are_unusual_and_a_spring_is_not() -> None:

@@ -81,7 +81,12 @@ def _amplitudes(effect: Effect) -> list[str]:
 
 
 def test_the_search_does_not_ask_for_them_and_bad_values_are_refused() -> None:
-    assert [name for name, kind in catalogue().items() if not kind.searched] == ["angle_viscosity", "biarticular_end_range"]
+    assert [name for name, kind in catalogue().items() if not kind.searched] == [
+        "angle_viscosity",
+        "active_viscosity",
+        "active_stiffness",
+        "biarticular_end_range",
+    ]
     for change, message in (({"range": 0.0}, "range"), ({"lower_viscosity": -0.1}, "lower_viscosity")):
         with pytest.raises(BadInput, match=message):
             MODEL.replace(effects=(Effect("angle_viscosity", 2, parameters=THICK | change),))

@@ -70,6 +70,8 @@ class Kind:
     """Lowest joint at which it can stand; 2 where it also acts in the joint before."""
     family: str = ""
     """The family of effects that it belongs to: of its members movements may not tell one from another."""
+    feels_activity: bool = False
+    """Whether it depends on the activity of muscles, which `emg_*` columns and `[[muscle]]` of a data set tell."""
     rate_independent: bool = False
     """Whether its torque is a constant, or one whose sign alone follows the motion: what a quasi-static analysis can find."""
     searched: bool = True

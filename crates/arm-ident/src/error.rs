@@ -38,6 +38,9 @@ pub enum IdentError {
     /// A measured path of the first joint, which simulated motion does not follow.
     #[error("the first joint moves: its path is taken into account along measured motion alone")]
     MovingBase,
+    /// Measured muscle activity, which simulated motion does not follow.
+    #[error("muscles are active: they are taken into account along measured motion alone")]
+    MuscleActivity,
     /// Something about one trial.
     #[error("trial {number}: {error}")]
     InTrial {

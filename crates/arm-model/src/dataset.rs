@@ -87,6 +87,71 @@ impl AddedMass {
     }
 }
 
+/// A muscle whose activity a channel tells, and the joint that it moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Muscle {
+    /// Name of its column.
+    pub channel: String,
+    /// Number of the joint, from 1.
+    pub joint: i64,
+    /// Envelope of a maximal voluntary contraction, in the unit of the channel; without it the largest of the session.
+    pub mvc: Option<f64>,
+    /// Envelope at rest, in the unit of the channel; without it the median of the session.
+    pub rest: Option<f64>,
+    /// By how much torque follows activity \[s\].
+    pub delay: f64,
+}
+
+/// Delay of torque behind activity where none is stated \[s\]: Cavanagh and Komi 1979 found 0.0495 to 0.0555 s in elbow flexors.
+const DELAY: f64 = 0.05;
+
+impl Muscle {
+    /// Reads a table; `place` names it in refusals.
+    ///
+    /// # Errors
+    /// [`Refused`] for an unknown or missing key and for a value out of bounds.
+    pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
+        let mut fields = Fields::new(place, value)?;
+        fields.only(&["channel", "joint"], &["mvc", "rest", "delay_s"])?;
+        let channel = fields.required_text("channel")?;
+        if !channel.starts_with("emg_") {
+            let found = Value::from(channel.as_str()).shown();
+            return Err(Refused::new(
+                fields.at("channel"),
+                found,
+                "the name of an emg_ column",
+            ));
+        }
+        let level = |least: Bounds| least.most(1e9);
+        let seconds = Bounds::finite("s").least(0.0).most(0.5);
+        let muscle = Self {
+            channel,
+            joint: fields.whole("joint", 1)?.unwrap_or(1),
+            mvc: fields.maybe_number("mvc", &level(Bounds::finite("").above(0.0)))?,
+            rest: fields.maybe_number("rest", &level(Bounds::finite("").least(0.0)))?,
+            delay: fields.maybe_number("delay_s", &seconds)?.unwrap_or(DELAY),
+        };
+        match (muscle.mvc, muscle.rest) {
+            (Some(most), Some(rest)) if most <= rest => {
+                let (found, allowed) =
+                    (Value::Number(most).shown(), format!("above rest = {rest}"));
+                Err(Refused::new(fields.at("mvc"), found, allowed))
+            }
+            _ => Ok(muscle),
+        }
+    }
+
+    /// The muscle as it stands in a file.
+    pub fn to_table(&self) -> Table {
+        let mut table = Table::new()
+            .with("channel", self.channel.as_str())
+            .with("joint", self.joint);
+        table.push("mvc", self.mvc);
+        table.push("rest", self.rest);
+        table.with("delay_s", self.delay)
+    }
+}
+
 /// What `dataset.toml` says of one trial.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TrialEntry {
@@ -149,6 +214,8 @@ pub struct Description {
     pub tolerance: Tolerance,
     /// Masses that are worn in some configurations besides the model.
     pub added: Vec<AddedMass>,
+    /// Muscles whose activity is recorded.
+    pub muscles: Vec<Muscle>,
     /// The trials, in the order of the file.
     pub trials: Vec<TrialEntry>,
 }
@@ -193,6 +260,7 @@ impl Description {
                 "subject",
                 "tolerance",
                 "added",
+                "muscle",
             ],
         )?;
         let tables = fields.tables("trial", "trial")?;
@@ -221,6 +289,7 @@ impl Description {
             subject,
             tolerance: Tolerance::from_value("[tolerance]", table(fields.take("tolerance")))?,
             added: added(fields.tables("added", "added")?, &trials)?,
+            muscles: muscles(fields.tables("muscle", "muscle")?)?,
             synthetic: fields.flag("synthetic")?,
             trials,
         })
@@ -249,6 +318,12 @@ impl Description {
                 list(self.added.iter().map(AddedMass::to_table).collect()),
             );
         }
+        if !self.muscles.is_empty() {
+            table.push(
+                "muscle",
+                list(self.muscles.iter().map(Muscle::to_table).collect()),
+            );
+        }
         table.with(
             "trial",
             list(self.trials.iter().map(TrialEntry::to_table).collect()),
@@ -256,7 +331,7 @@ impl Description {
     }
 }
 
-by_value!(AddedMass, TrialEntry, Description);
+by_value!(AddedMass, Muscle, TrialEntry, Description);
 
 fn added(tables: Vec<Value>, trials: &[TrialEntry]) -> Result<Vec<AddedMass>, Refused> {
     let read = |(k, table): (usize, Value)| {
@@ -276,6 +351,27 @@ fn added(tables: Vec<Value>, trials: &[TrialEntry]) -> Result<Vec<AddedMass>, Re
         }
     };
     (1..).zip(tables).map(read).collect()
+}
+
+fn muscles(tables: Vec<Value>) -> Result<Vec<Muscle>, Refused> {
+    let mut all: Vec<Muscle> = Vec::new();
+    for (k, table) in (1..).zip(tables) {
+        let muscle = Muscle::from_value(&format!("[[muscle]] {k}"), table)?;
+        if let Some(before) = all.iter().position(|m| m.channel == muscle.channel) {
+            let found = Value::from(muscle.channel.as_str()).shown();
+            let allowed = format!(
+                "each channel once: [[muscle]] {} has it already",
+                before + 1
+            );
+            return Err(Refused::new(
+                format!("[[muscle]] {k}, channel"),
+                found,
+                allowed,
+            ));
+        }
+        all.push(muscle);
+    }
+    Ok(all)
 }
 
 fn check_trials(trials: &[TrialEntry]) -> Result<(), Refused> {

@@ -48,7 +48,7 @@ mod value;
 
 pub use catalogue::{declare, kind, kinds};
 pub use contact::Contact;
-pub use dataset::{AddedMass, Description, ForceOn, Role, TrialEntry};
+pub use dataset::{AddedMass, Description, ForceOn, Muscle, Role, TrialEntry};
 pub use effect::{Channel, Effect, Site};
 pub use fields::{Bounds, Fields};
 pub use joint::{Joint, joint_laws};

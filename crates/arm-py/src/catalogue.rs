@@ -41,6 +41,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("first_joint", if kind.crosses() { 2 } else { 1 })?;
         entry.set_item("family", kind.family().name())?;
         entry.set_item("rate_independent", kind.is_rate_independent())?;
+        entry.set_item("feels_activity", kind.feels_activity())?;
         entry.set_item("searched", !kind.prior().parts.is_empty())?;
         entry.set_item("address", info.place.address())?;
         entry.set_item("own", matches!(kind, Kind::Own(_)))?;

@@ -170,6 +170,11 @@ pub fn simulation(error: SimulationError) -> PyErr {
             found,
             allowed,
         } => bad_input(name, found, allowed),
+        SimulationError::NoActivity { kind } => bad_input(
+            "effects of the model",
+            kind,
+            "muscle activity, in a trial with emg columns and [[muscle]] in dataset.toml: identify and simulate alone follow it",
+        ),
         SimulationError::Samples {
             name,
             sample,

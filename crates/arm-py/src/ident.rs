@@ -35,6 +35,7 @@ pub struct Columns<'py> {
     tau: Option<PyReadonlyArray2<'py, f64>>,
     robot_q: Option<PyReadonlyArray2<'py, f64>>,
     base: Option<PyReadonlyArray2<'py, f64>>,
+    activity: Option<PyReadonlyArray2<'py, f64>>,
     valid: PyReadonlyArray1<'py, bool>,
 }
 
@@ -96,6 +97,10 @@ fn trial<const N: usize>(c: &Columns<'_>, configuration: usize, rig: &Rig) -> Py
         _ => None,
     };
     let base = c.base.as_ref().map(|b| rows::<2>("base", b)).transpose()?;
+    // Where no effect depends on it, the arm moves without it.
+    let felt = rig.effects.iter().any(|e| e.kind.feels_activity());
+    let activity = c.activity.as_ref().filter(|_| felt);
+    let activity = activity.map(|a| rows("activity", a)).transpose()?;
     let trial = Trial {
         role: if c.role == "test" {
             Role::Test
@@ -115,6 +120,7 @@ fn trial<const N: usize>(c: &Columns<'_>, configuration: usize, rig: &Rig) -> Py
         torque: c.tau.as_ref().map(|t| joints("tau", t)).transpose()?,
         handle,
         base,
+        activity,
         valid: c.valid.as_array().to_vec(),
     };
     let n = trial.len();
@@ -125,6 +131,7 @@ fn trial<const N: usize>(c: &Columns<'_>, configuration: usize, rig: &Rig) -> Py
         ("tau", trial.torque.as_ref().map(Vec::len)),
         ("robot_q", trial.handle.as_ref().map(Vec::len)),
         ("base", trial.base.as_ref().map(Vec::len)),
+        ("activity", trial.activity.as_ref().map(Vec::len)),
         ("valid", Some(trial.valid.len())),
     ];
     for (name, found) in lengths {

@@ -33,6 +33,8 @@ pub struct Driven<'py> {
     rigid: bool,
     /// How far the first joint is from its place at the times [m].
     base: Option<PyReadonlyArray2<'py, f64>>,
+    /// Activity of the muscles of each joint at the times, 0 to 1.
+    activity: Option<PyReadonlyArray2<'py, f64>>,
 }
 
 /// Numerical settings, a Python `CoreRun`.
@@ -254,6 +256,8 @@ pub fn experiment<const N: usize>(
     settings: &Settings,
 ) -> PyResult<Experiment<N>> {
     let base = base_path(drive)?;
+    let felt = rig.effects.iter().any(|e| e.kind.feels_activity());
+    let activity = if felt { activity::<N>(drive)? } else { None };
     let (drive, first, natural) = driven(chain, rig, drive)?;
     // A whole number of recorded samples: not beyond the last sample of a drive, and up to the end of a movement.
     let whole = |d: f64| {
@@ -280,6 +284,7 @@ pub fn experiment<const N: usize>(
     experiment.effects = rig.effects.clone();
     experiment.robot = rig.robot;
     experiment.base = base;
+    experiment.activity = activity;
     experiment.dt = settings.dt;
     experiment.output_interval = settings.output_interval;
     experiment.integrator = match settings.integrator.as_str() {
@@ -318,6 +323,16 @@ fn base_path(drive: &Driven<'_>) -> PyResult<Option<Series<2>>> {
     };
     let (times, points) = (times.as_array().to_vec(), rows("path of the base", base)?);
     let series = Series::new("path of the base", &times, &points, Interpolation::Cubic);
+    Ok(Some(series.map_err(simulation)?))
+}
+
+/// The measured activity of muscles, where there is some; from sample to sample in straight lines, as no overshoot is one.
+fn activity<const N: usize>(drive: &Driven<'_>) -> PyResult<Option<Series<N>>> {
+    let (Some(activity), Some(times)) = (&drive.activity, &drive.times) else {
+        return Ok(None);
+    };
+    let (times, points) = (times.as_array().to_vec(), rows("activity", activity)?);
+    let series = Series::new("muscle activity", &times, &points, Interpolation::Linear);
     Ok(Some(series.map_err(simulation)?))
 }
 

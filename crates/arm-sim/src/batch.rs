@@ -92,9 +92,11 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && kinds(a) == kinds(b)
 }
 
-/// Whether two runs are driven in the same way, seen from the base.
+/// Whether two runs are driven in the same way, seen from the base, with the same muscle activity.
 fn same_drive<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
-    a.experiment.drive == b.experiment.drive && a.experiment.base == b.experiment.base
+    a.experiment.drive == b.experiment.drive
+        && a.experiment.base == b.experiment.base
+        && a.experiment.activity == b.experiment.activity
 }
 
 /// The run of a lane. A group of fewer than eight repeats its last one in the lanes left over.
@@ -492,6 +494,7 @@ fn pack_input<const N: usize>(input: impl Fn(usize) -> Input<f64, N>) -> Input<W
             velocity: pack_plane(|i| inputs[i].base.velocity),
             acceleration: pack_plane(|i| inputs[i].base.acceleration),
         },
+        activity: core::array::from_fn(|j| pack(|i| inputs[i].activity[j])),
     }
 }
 

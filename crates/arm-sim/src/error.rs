@@ -19,6 +19,12 @@ pub enum SimulationError {
         /// The values allowed, in words.
         allowed: &'static str,
     },
+    /// An effect that depends on muscle activity, of which nothing is told.
+    #[error("{kind} depends on muscle activity, of which nothing is told")]
+    NoActivity {
+        /// Kind of the effect.
+        kind: &'static str,
+    },
     /// A table of samples that cannot be a function of time.
     #[error("{name}, sample {sample}: {problem}")]
     Samples {

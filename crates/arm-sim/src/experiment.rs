@@ -23,6 +23,8 @@ pub struct Experiment<const N: usize> {
     pub robot: Option<Robot<f64>>,
     /// How far the base is from its place, y and z \[m\], where its path was measured.
     pub base: Option<Series<2>>,
+    /// Activity of the muscles that move each joint, where it was measured; effects that depend on it need it.
+    pub activity: Option<Series<N>>,
     /// Where it starts.
     pub start: Start<N>,
     /// Step \[s\], 0.25 ms unless set.
@@ -56,6 +58,7 @@ impl<const N: usize> Experiment<N> {
             drive,
             robot: None,
             base: None,
+            activity: None,
             start: Start::Given {
                 q: Joints::zeros(),
                 qd: Joints::zeros(),

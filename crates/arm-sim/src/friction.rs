@@ -342,5 +342,8 @@ fn input_at<const N: usize>(inputs: &Inputs<f64, N>, h: f64, x: f64) -> Input<f6
             velocity: plane(&|input| input.base.velocity),
             acceleration: plane(&|input| input.base.acceleration),
         },
+        activity: core::array::from_fn(|j| {
+            parabola(start.activity[j], middle.activity[j], end.activity[j])
+        }),
     }
 }

@@ -277,7 +277,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         memory: &[States<T>],
     ) -> Outcome<T, N> {
         let pose = Pose::new(q);
-        let mut motion = Motion::new(input.time, *q, *qd);
+        let mut motion = input.motion(q, qd);
         let mut resisting = self.resisting(&motion, memory);
         let (mut force, lost) = self.contact(input, q, qd, &pose);
         let driving = self.driving(input, &pose);

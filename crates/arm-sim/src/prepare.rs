@@ -45,6 +45,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
         in_pieces: bool,
     ) -> Result<Self, SimulationError> {
         let schedule = Schedule::of(experiment)?;
+        told(&experiment.effects, experiment.activity.is_some())?;
         let setup = experiment.altered()?;
         let mut model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
         model.heaves |= experiment.base.is_some();
@@ -138,13 +139,14 @@ pub(crate) fn command<const N: usize>(experiment: &Experiment<N>, time: f64) -> 
         },
         torque: Joints::zeros(),
         base: BaseMotion::still(),
+        activity: [0.0; N],
     };
     match &experiment.drive {
         Drive::Handle { path, .. } => input.handle = path.at(time),
         Drive::Torque(Some(series)) => input.torque = series.at(time).value.into(),
         Drive::Torque(None) => {}
     }
-    see_from_base(experiment, core::slice::from_mut(&mut input));
+    with_measured(experiment, core::slice::from_mut(&mut input));
     input
 }
 
@@ -170,18 +172,33 @@ pub(crate) fn commands<const N: usize>(
         half_steps,
         out,
     });
-    see_from_base(experiment, &mut out[from..]);
+    with_measured(experiment, &mut out[from..]);
 }
 
-/// Moves the base along its measured path, if there is one.
+/// Moves the base along its measured path, and tells the activity of muscles, where there is one.
 #[inline]
-fn see_from_base<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input<f64, N>]) {
-    let Some(path) = &experiment.base else {
-        return;
-    };
-    for input in inputs {
-        let jet = path.at(input.time);
-        input.move_base([jet.value, jet.rate, jet.curvature]);
+fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input<f64, N>]) {
+    if let Some(path) = &experiment.base {
+        for input in &mut *inputs {
+            let jet = path.at(input.time);
+            input.move_base([jet.value, jet.rate, jet.curvature]);
+        }
+    }
+    if let Some(activity) = &experiment.activity {
+        for input in inputs {
+            input.activity = activity.at(input.time).value;
+        }
+    }
+}
+
+/// Refuses effects that depend on muscle activity where nothing tells it.
+pub(crate) fn told(effects: &[Effect<f64>], activity: bool) -> Result<(), SimulationError> {
+    let deaf = |e: &&Effect<f64>| e.on && e.kind.feels_activity() && !activity;
+    match effects.iter().find(deaf) {
+        Some(effect) => Err(SimulationError::NoActivity {
+            kind: effect.kind.info().kind,
+        }),
+        None => Ok(()),
     }
 }
 
@@ -208,6 +225,7 @@ impl<const N: usize> Computation for Abreast<'_, N> {
                 handle,
                 torque: Joints::zeros(),
                 base: BaseMotion::still(),
+                activity: [0.0; N],
             }));
         }
     }
@@ -305,10 +323,12 @@ pub(crate) fn known<const N: usize>(
     };
     let base = experiment.base.as_ref();
     let base = base.map(|path| ("the path of the base", (path.start(), path.end())));
+    let activity = experiment.activity.as_ref();
+    let activity = activity.map(|series| ("the muscle activity", (series.start(), series.end())));
     let needed = schedule.time(schedule.steps);
     // The last sample may miss the end by rounding.
     let slack = 1e-6 * schedule.dt;
-    for (name, (from, to)) in drive.into_iter().chain(base) {
+    for (name, (from, to)) in drive.into_iter().chain(base).chain(activity) {
         if !(from <= slack && needed <= to + slack) {
             return Err(SimulationError::TooShort {
                 name,

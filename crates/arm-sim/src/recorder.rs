@@ -2,7 +2,7 @@
 
 use core::ops::ControlFlow;
 
-use arm_core::effect::{Motion, States};
+use arm_core::effect::States;
 use arm_core::{Joints, Plane, Pose, Scalar, contributions};
 
 use crate::friction::{self, Friction};
@@ -111,7 +111,7 @@ impl<T: Scalar> Row<T> {
             memory,
         } = instant;
         let pose = Pose::new(q);
-        let mut motion = Motion::new(input.time, *q, *qd);
+        let mut motion = input.motion(q, qd);
         motion.joint_force = forces.joint_force;
         let mut resisting = model.resisting(&motion, memory);
         if let Some(friction) = &forces.friction {

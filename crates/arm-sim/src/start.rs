@@ -1,6 +1,6 @@
 //! The state in which a run starts.
 
-use arm_core::effect::{MAX_STATES, Motion, dry_friction};
+use arm_core::effect::{MAX_STATES, dry_friction};
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
@@ -186,7 +186,7 @@ fn most_friction<const N: usize>(
     let (q, rest) = (Joints::from_fn(|i, _| x[i]), Joints::<f64, N>::zeros());
     let force = force(model, input, x);
     let through = model.through_joints(&Pose::new(&q), (&rest, &rest), (force, input));
-    let motion = Motion::new(0.0, q, rest).with_joint_force(&through);
+    let motion = input.motion(&q, &rest).with_joint_force(&through);
     let memory = vec![[0.0; MAX_STATES]; model.effects.len()];
     dry_friction(&model.effects, &motion, &memory)
 }
@@ -325,7 +325,7 @@ fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[
     let rest = Joints::<f64, N>::zeros();
     let pose = Pose::new(&q);
     let memory = vec![[0.0; MAX_STATES]; model.effects.len()];
-    let resisting = model.resisting(&Motion::new(0.0, q, rest), &memory);
+    let resisting = model.resisting(&input.motion(&q, &rest), &memory);
     let force = force(model, input, x);
     let terms = model.terms(&pose, &rest);
     let held = terms.tip_torque(force);

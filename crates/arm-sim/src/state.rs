@@ -1,5 +1,6 @@
 //! What drives the arm at one instant, its state, and what follows from both.
 
+use arm_core::effect::Motion;
 use arm_core::{Joints, Lanes, Plane, Scalar, Setup};
 
 use crate::Handle;
@@ -13,6 +14,8 @@ pub(crate) struct Input<T, const N: usize> {
     pub torque: Joints<T, N>,
     /// Where the base is; the handle is seen from there.
     pub base: BaseMotion<T>,
+    /// Of the muscles that move each joint, see [`Motion::activity`].
+    pub activity: [T; N],
 }
 
 /// A base that moves whatever the arm does.
@@ -37,6 +40,15 @@ impl<T: Scalar> BaseMotion<T> {
 }
 
 impl<T: Scalar, const N: usize> Input<T, N> {
+    /// An arm that moves at this instant, as effects see it; without accelerations and joint forces.
+    #[inline]
+    pub fn motion(&self, q: &Joints<T, N>, qd: &Joints<T, N>) -> Motion<T, N> {
+        Motion {
+            activity: self.activity,
+            ..Motion::new(self.time, *q, *qd)
+        }
+    }
+
     /// Puts the handle where it stands in a rig, beside where it is commanded, and the base where it heaves.
     #[inline]
     pub fn stands_as_in(&mut self, setup: &Setup<T, N>) {

@@ -248,7 +248,7 @@ fn motion<T: Scalar, const N: usize>(
     qd: &Joints<T, N>,
     now: &Outcome<T, N>,
 ) -> Motion<T, N> {
-    let mut motion = Motion::new(input.time, *q, *qd);
+    let mut motion = input.motion(q, qd);
     motion.qdd = now.qdd;
     motion.joint_force = now.joint_force;
     motion

@@ -8,7 +8,7 @@ use crate::experiment::altered;
 use crate::friction::{self, advance};
 use crate::model::{Link, Model};
 use crate::native::{diverged, why};
-use crate::prepare::assemble;
+use crate::prepare::{assemble, told};
 use crate::state::{BaseMotion, Input, State};
 use crate::step::{Inputs, Memory};
 use crate::{Handle, Integrator, SimulationError, stability, start};
@@ -83,6 +83,7 @@ fn input<const N: usize>(
         },
         torque: outside.torque + outside.torque_rate * (outside.torque_age + later),
         base: BaseMotion::still(),
+        activity: [0.0; N],
     };
     input.stands_as_in(setup);
     input
@@ -178,6 +179,7 @@ impl<const N: usize> Stepper<N> {
                 allowed: "a positive number of seconds",
             });
         }
+        told(effects, false)?;
         let setup = altered(setup, effects)?;
         let link = match port {
             Port::Force => Link::Forced([0.0; 2]),

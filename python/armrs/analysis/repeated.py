@@ -34,3 +34,9 @@ def completed(values: np.ndarray, broken: np.ndarray) -> np.ndarray:
         level = mean((values - shape).T)
         shape = mean(values - level[:, None])
     return np.where(broken[:, None] & ~np.isfinite(values), shape + level[:, None], values)
+
+
+def slope(values: np.ndarray, edges: np.ndarray) -> float:
+    """Return the slope of the straight line through values in bins with these edges; zero for fewer than two that are there."""
+    there, middle = np.isfinite(values), 0.5 * (edges[1:] + edges[:-1])
+    return float(np.polyfit(middle[there], values[there], 1)[0]) if there.sum() > 1 else 0.0

@@ -116,6 +116,30 @@ def angle_errors(model: Model, q: np.ndarray, deviations: Deviations, *, markers
     return errors
 
 
+def placements(
+    model: Model, q: np.ndarray, force: np.ndarray | None, deviations: Deviations, declared: np.ndarray, spring: tuple[int, float]
+) -> np.ndarray:
+    """Return what misplaced markers do to the moment of a joint at the angles that they tell, shape (4 n_joints, n) [N m].
+
+    Lengths and angles follow from markers. A misread angle also moves the moment to another angle, by the slope of the moment.
+
+    Parameters
+    ----------
+    model, q, force, deviations
+        As for `sensitivity`.
+    declared : ndarray
+        What that returned.
+    spring : (int, float)
+        The joint, from 0, and the slope of its moment [N m/rad].
+    """
+    joint, stiffness = spring
+    n, none = model.n_joints, np.zeros(len(declared))
+    turned = angle_errors(model, q, deviations, markers=force is not None)
+    here = moments(model, q, force, none)[:, joint]
+    misread = [here - moments(model, q - e, force, none)[:, joint] - stiffness * e[:, joint] for e in turned]
+    return np.concatenate([declared[2 * n : 3 * n, :, joint], misread])
+
+
 def by_jacobian(parts: np.ndarray) -> np.ndarray:
     """Return standard deviations from derivatives times deviations, which stand along axis 0."""
     return np.sqrt(np.sum(parts**2, axis=0))

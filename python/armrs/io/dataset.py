@@ -16,12 +16,12 @@ import numpy as np
 from .. import checks
 from ..anthropometry import literature_model
 from ..errors import ArmrsError, BadInput, BadInputs, Text
-from ..model import AddedMass, Description, Model, Subject, Tolerance, TrialEntry, load_model
+from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, TrialEntry, load_model
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
 from ..telling import telling
 from . import files
 from .faults import faults_of
-from .muscle_activity import mark_activity
+from .muscle_activity import joint_activity, mark_activity
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
@@ -34,7 +34,7 @@ _MOST_SEGMENTS = 3
 
 _CHANNELS = {
     "q": ("joint", "rad"), "dq": ("joint", "rad/s"), "tau": ("joint", "N m"), "force_on_arm": ("axis", "N"), "base": ("axis", "m"),
-    "moment_on_arm": ("", "N m"), "robot_q": ("robot_joint", "rad"),
+    "moment_on_arm": ("", "N m"), "robot_q": ("robot_joint", "rad"), "activity": ("joint", "1"),
 }  # fmt: skip
 """What trials hold: the dimension beside that of samples, and the unit."""
 
@@ -65,6 +65,8 @@ class Dataset(Framed, Series):
         Whether the trials were simulated; reports say so.
     added : tuple of AddedMass
         Masses that are worn in some configurations besides the model.
+    muscles : tuple of Muscle
+        Whose activity the channels tell.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Dataset(Framed, Series):
     warnings: tuple[str, ...] = ()
     synthetic: bool = False
     added: tuple[AddedMass, ...] = ()
+    muscles: tuple[Muscle, ...] = ()
 
     def __post_init__(self) -> None:
         checks.instance("model", self.model, Model)
@@ -100,6 +103,7 @@ class Dataset(Framed, Series):
         object.__setattr__(self, "warnings", checks.instances("warnings", self.warnings, str))
         object.__setattr__(self, "synthetic", checks.flag("synthetic", self.synthetic))
         object.__setattr__(self, "added", checks.instances("added", self.added, AddedMass))
+        object.__setattr__(self, "muscles", checks.instances("muscles", self.muscles, Muscle))
 
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
@@ -234,7 +238,11 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         trials.append(reading.trial)
         warnings += [f"{entry.file}: {line}" for line in reading.warnings]
     marked, lines = mark_activity(trials)
-    warnings += lines
+    try:
+        marked, relative = joint_activity(marked, description.muscles, model.n_joints)
+    except BadInput as error:
+        raise error.within(file=path) from None
+    warnings += [*lines, *relative]
     return Dataset(
         name=name_of(path, description),
         model=model,
@@ -248,6 +256,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         warnings=(*warnings, *still_angles(tuple(trials)), *moving_bases(trials)),
         synthetic=description.synthetic,
         added=description.added,
+        muscles=description.muscles,
     )
 
 
@@ -360,6 +369,7 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
         tolerance=dataset.tolerance,
         synthetic=dataset.synthetic,
         added=dataset.added,
+        muscles=dataset.muscles,
     ).to_toml()
 
     def write(part: Path) -> list[Path]:

@@ -12,6 +12,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from .. import checks
+from ..errors import BadInput, Text
+from ..model import Muscle
 from .trial import Trial
 
 SMOOTHED = 0.1
@@ -76,6 +79,74 @@ def _applied(trials: Sequence[Trial], active: list[np.ndarray], lines: list[str]
     return tuple(marked), lines
 
 
+def joint_activity(trials: Sequence[Trial], muscles: Sequence[Muscle], n_joints: int) -> tuple[tuple[Trial, ...], list[str]]:
+    """Tell the activity of the muscles of each joint: their mean, 0 at rest and 1 in a maximal voluntary contraction.
+
+    That of a muscle is its envelope above rest, relative to that of the contraction, as late as torque follows it. Rest is the median of
+    the session and the contraction its largest envelope, where the muscle does not state them.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Of one session, whose channels have one gain.
+    muscles : sequence of Muscle
+    n_joints : int
+
+    Returns
+    -------
+    trials : tuple of Trial
+        With `activity` set, where there is a muscle.
+    lines : list of str
+        What the reader should know.
+
+    Raises
+    ------
+    BadInput
+        For a joint that the arm does not have, and a channel that a trial does not have.
+    """
+    if not muscles:
+        return tuple(trials), []
+    sums, counts, lines = [np.zeros((len(trial), n_joints)) for trial in trials], np.zeros(n_joints), []
+    for number, muscle in enumerate(muscles, start=1):
+        joint = checks.whole(f"[[muscle]] {number}, joint", muscle.joint, least=1, most=n_joints) - 1
+        counts[joint] += 1
+        for trial in trials:
+            if muscle.channel not in trial.emg:
+                found = Text(f"no such column in {trial.file}")
+                raise BadInput(f"[[muscle]] {number}, channel", found, f"a column of every trial: {', '.join(trial.emg) or 'none'}")
+        for own, relative in zip(sums, _relative(trials, muscle), strict=True):
+            own[:, joint] += relative
+        if muscle.mvc is None:
+            lines.append(
+                f"{muscle.channel}: no mvc is stated, so its activity is relative to the largest of this session, and what depends on "
+                "it is not comparable with other sessions"
+            )
+    told = [dataclasses.replace(t, activity=own / np.maximum(counts, 1.0)) for t, own in zip(trials, sums, strict=True)]
+    return tuple(told), lines
+
+
+def _relative(trials: Sequence[Trial], muscle: Muscle) -> list[np.ndarray]:
+    """Return the activity of one muscle in each trial, 0 at rest and 1 in a maximal contraction."""
+    envelopes = [_envelope(trial, muscle.channel) for trial in trials]
+    rest, most = _levels(envelopes, muscle)
+    late = [np.interp(t.t - muscle.delay_s, t.t, np.nan_to_num(e, nan=rest)) for t, e in zip(trials, envelopes, strict=True)]
+    return [np.maximum(e - rest, 0.0) / max(most - rest, 1e-300) for e in late]
+
+
+def _levels(envelopes: Sequence[np.ndarray], muscle: Muscle | None) -> tuple[float, float]:
+    """Return the envelope of a channel at rest and in a maximal contraction: as stated, else by the session."""
+    together = np.concatenate(envelopes)
+    there = together[np.isfinite(together)]
+    stated = (None, None) if muscle is None else (muscle.rest, muscle.mvc)
+    rest = float(np.median(there)) if stated[0] is None else stated[0]
+    return rest, float(there.max()) if stated[1] is None else stated[1]
+
+
+def active_kept(trials: Sequence[Trial]) -> tuple[Trial, ...]:
+    """Return trials in which what is active counts as well: for a model that says what muscles do."""
+    return tuple(dataclasses.replace(trial, valid=trial.valid | trial.active) for trial in trials)
+
+
 def comparable(trials: Sequence[Trial]) -> tuple[Trial, ...]:
     """Return trials in which what is active in one repeat of a movement is left out of all: `gap` compares repeats sample by sample."""
     shared = []
@@ -96,11 +167,11 @@ def antagonists(names: Iterable[str]) -> list[tuple[str, str]]:
     return [(name, other) for name in found if "flexor" in name and (other := name.replace("flexor", "extensor")) in found]
 
 
-def co_contraction(trials: Sequence[Trial], number: int, start: float, end: float) -> float | None:
+def co_contraction(trials: Sequence[Trial], number: int, start: float, end: float, muscles: Sequence[Muscle] = ()) -> float | None:
     """Return how much antagonists work against one another in a stretch of a trial: 0, one alone, to 1, both alike.
 
     `2 ∫ min(a, b) dt / ∫ (a + b) dt` (Falconer and Winter 1985), a and b the envelopes above rest where they are active, each relative to
-    its largest in the session, as no maximal contraction is recorded. The largest over the pairs of the trial.
+    a maximal voluntary contraction where its muscle states one, else to its largest in the session. The largest over the pairs counts.
 
     Parameters
     ----------
@@ -110,6 +181,8 @@ def co_contraction(trials: Sequence[Trial], number: int, start: float, end: floa
         Which of them, from 0.
     start, end : float
         Of the stretch [s].
+    muscles : sequence of Muscle
+        That state rest and contraction of their channels.
 
     Returns
     -------
@@ -118,15 +191,17 @@ def co_contraction(trials: Sequence[Trial], number: int, start: float, end: floa
     """
     trial = trials[number]
     during = (trial.t >= start) & (trial.t <= end)
+    stated = {muscle.channel: muscle for muscle in muscles}
     indices = []
     for pair in antagonists(trial.emg):
         sizes = []
         for name in pair:
             envelopes = [_envelope(t, name) for t in trials]
             together = np.concatenate(envelopes)
-            rest, threshold = _resting(together[np.isfinite(together)])
-            size = envelopes[number][during] - rest
-            sizes.append(np.where(size > threshold - rest, size, 0.0) / max(float(np.nanmax(together)) - rest, 1e-300))
+            level, threshold = _resting(together[np.isfinite(together)])
+            rest, most = _levels(envelopes, stated.get(name))
+            own = envelopes[number][during]
+            sizes.append(np.where(own > threshold - level + rest, own - rest, 0.0) / max(most - rest, 1e-300))
         whole = float(np.nansum(sizes[0] + sizes[1]))
         if whole > 0.0:
             indices.append(2.0 * float(np.nansum(np.minimum(*sizes))) / whole)

@@ -78,6 +78,9 @@ class Trial:
         Columns before resampling, by their names in SI units, with the signs of the file; NaN where missing.
     resampled : bool
         Whether the time stamps were uneven. Otherwise `t` is `original_t`.
+    activity : ndarray, shape (n, n_joints), or None
+        Activity of the muscles that move each joint, 0 at rest and 1 in a maximal voluntary contraction; None where no `[[muscle]]` says
+        which these are.
     base : ndarray, shape (n, 2), or None
         Measured path of the first joint, y and z [m]; None where it rests at the model's `base`.
     """
@@ -102,6 +105,7 @@ class Trial:
     original: Mapping[str, np.ndarray] = field(default_factory=dict)
     resampled: bool = False
     base: np.ndarray | None = None
+    activity: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("file", "configuration"):
@@ -114,7 +118,7 @@ class Trial:
         joints = checks.samples("q", self.q, "rad", shape=(n, None)).shape[1]
         shapes: dict[str, tuple[int, ...]] = {
             "force_on_arm": (n, 2), "moment_on_arm": (n,), "robot_q": (n, 2), "tau": (n, joints), "dq": (n, joints),
-            "base": (n, 2),
+            "base": (n, 2), "activity": (n, joints),
         }  # fmt: skip
         for name, shape in {"t": (n,), "q": (n, joints), **shapes}.items():
             if getattr(self, name) is not None:

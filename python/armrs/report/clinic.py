@@ -16,7 +16,7 @@ from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from . import figures, html, pages, plotting, session_changes
-from .words import disturbance, is_synthetic, name, with_joint_names
+from .words import disturbance, is_synthetic, name, together, with_joint_names
 
 
 @dataclass(frozen=True)
@@ -515,7 +515,7 @@ def found(result: Mapping[str, Any]) -> list[str]:
 def notes(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what the analysis says against its own numbers."""
     said = [str(check["text"]) for result in results for check in result.get("checks", ()) if check["passed"] is False]
-    said += [with_joint_names(str(line), result["data"]["joints"]) for result in results for line in result.get("warnings", ())]
+    said = together(said + [with_joint_names(str(line), r["data"]["joints"]) for r in results for line in r.get("warnings", ())])
     more = len(said) - MOST_NOTES
     return said if more <= 0 else [*said[:MOST_NOTES], f"and {more} more, in the reports of the analysis"]
 

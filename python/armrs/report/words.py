@@ -421,6 +421,15 @@ def reproduced(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     files_written(written[-1:])
 
 
+def together(lines: Sequence[str]) -> list[str]:
+    """Return lines that say the same of several movements or recordings (`NAME: what`) as one, where the first of them stood."""
+    said: dict[str, list[str]] = {}
+    for line in lines:
+        name, colon, what = line.partition(": ")
+        said.setdefault(what if colon else line, []).append(name if colon else "")
+    return [f"{', '.join(dict.fromkeys(names))}: {what}" if names[0] else what for what, names in said.items()]
+
+
 def with_joint_names(line: str, joints: Sequence[str]) -> str:
     """Return a line in which joints have their names in place of their numbers."""
     return re.sub(r"\bjoint ([1-9])\b", lambda found: joints[int(found[1]) - 1], line)

@@ -27,6 +27,8 @@ class CoreDrive:
     pause: float = 0.0
     base: np.ndarray | None = None
     """How far the first joint is from the model's base at the times [m]."""
+    activity: np.ndarray | None = None
+    """Activity of the muscles of each joint at the times, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,8 @@ def driven(model: Model, drive: Movement | Trial | None, coupling: str) -> CoreD
             raise BadInput(what, Text(f"none at {lost:g} s"), "samples without a gap: they drive the arm", file=drive.file)
         times = np.array(drive.t[:upto] - drive.t[0])
         base = None if drive.base is None else _armrs.displacement_of_base(drive.base[:upto], model.base, drive.rate)
-        return CoreDrive(kind, rigid, np.array(values[:upto]), times, base=base)
+        activity = None if drive.activity is None else np.array(drive.activity[:upto])
+        return CoreDrive(kind, rigid, np.array(values[:upto]), times, base=base, activity=activity)
     return CoreDrive("free", rigid)
 
 

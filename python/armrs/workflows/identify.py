@@ -16,7 +16,8 @@ from .._armrs import Fit as Fit
 from .._armrs import Identification as Identification
 from ..catalogue import catalogue
 from ..errors import BadInput, IdentificationError, Text, unknown_name
-from ..io.dataset import Dataset, load_dataset, naming_trials, refuse_other_arms
+from ..io.dataset import FILE, Dataset, load_dataset, naming_trials, refuse_other_arms
+from ..io.muscle_activity import active_kept
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Effect, Model, Tolerance
@@ -268,6 +269,7 @@ def identify(
     kinds = _checked(dataset, method, with_effects, cutoff, motion, level)
     model = dataset.model
     effects, fitted = effects_of(model, kinds)
+    dataset, effects, fitted = _with_muscles(dataset, effects, fitted)
     if not model.segment_uncertainty and not any(fitted):
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
     settings = CoreSettings(model, fitted, dataset.tolerance, method=method, cutoff=cutoff, motion=motion, level=level)
@@ -276,6 +278,26 @@ def identify(
     with naming_trials(dataset.trials):
         found, follows = _identified(_armrs.Rig(model, effects), settings, dataset)
     return _result(dataset, found, effects, (*unproved, *follows), other_weight(dataset))
+
+
+def _with_muscles(dataset: Dataset, effects: list[Effect], fitted: list[bool]) -> tuple[Dataset, list[Effect], list[bool]]:
+    """Return a data set in which active samples count if effects say what muscles do, and those of joints whose muscles are recorded.
+
+    Without such effects an active arm is no passive one: its active samples stay left out.
+    """
+    feel = [catalogue()[effect.kind].feels_activity for effect in effects]
+    if not any(feel):
+        return dataset, effects, fitted
+    recorded = {m.joint for m in dataset.muscles}
+    for effect in [e for e, felt in zip(effects, feel, strict=True) if felt]:
+        if not recorded or (effect in dataset.model.all_effects and effect.joint not in recorded):
+            found, allowed = (
+                Text(f"no muscle of joint {effect.joint}"),
+                f"an emg column that tells its activity: {effect.kind} depends on it",
+            )
+            raise BadInput("[[muscle]]", found, allowed, file=None if dataset.folder is None else dataset.folder / FILE)
+    kept = [k for k, (effect, felt) in enumerate(zip(effects, feel, strict=True)) if not felt or effect.joint in recorded]
+    return dataset.replace(trials=active_kept(dataset.trials)), [effects[k] for k in kept], [fitted[k] for k in kept]
 
 
 def _checked(
@@ -557,7 +579,7 @@ def bridged(trial: Trial) -> Trial:
                 column[bad] = np.interp(trial.t[bad], trial.t[~bad], column[~bad])
         return table.reshape(values.shape)
 
-    channels = ("q", "dq", "force_on_arm", "moment_on_arm", "tau", "robot_q", "base")
+    channels = ("q", "dq", "force_on_arm", "moment_on_arm", "tau", "robot_q", "base", "activity")
     filled: dict[str, Any] = {name: whole(getattr(trial, name)) for name in channels}
     return replace(trial, **filled)
 

@@ -12,7 +12,17 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _armrs, checks
-from ..analysis import double_exponential, joint_coupling, low_pass, passivity_checks, preconditioning, repeated, students_t, uncertainty
+from ..analysis import (
+    directions,
+    double_exponential,
+    joint_coupling,
+    low_pass,
+    passivity_checks,
+    preconditioning,
+    repeated,
+    students_t,
+    uncertainty,
+)
 from ..errors import BadInput, Text
 from ..io import resample
 from ..io.dataset import Dataset, load_dataset
@@ -29,10 +39,6 @@ LEAST_CUTOFF = 1e-3
 """Nobody moves slower [Hz]."""
 DEFAULT_BINS = 24
 """Angle bins over the range of a joint in one configuration."""
-LEAST_RANGE = np.radians(2.0)
-"""A joint that moves less than this counts as held [rad]."""
-MOVING = 0.25
-"""A joint moves when its speed is above this part of its usual speed in the trial."""
 MARGIN = 0.43
 """The low-pass mixes what lies within this time, in periods of its cutoff."""
 APART = np.radians(10.0)
@@ -113,6 +119,8 @@ class PassiveCurve:
         Standard deviations from the declared uncertainty of masses, lengths, angles and forces, the same error in all repeats [N m].
     elastic_errors : ndarray, shape (n_errors, k)
         What each of these errors does to the elastic mean, of the size of its standard deviation [N m].
+    placed_errors : ndarray, shape (2, n_placed, k)
+        What markers that every session places anew do to the elastic mean and to the half width, likewise [N m].
     """
 
     configuration: str
@@ -132,6 +140,7 @@ class PassiveCurve:
     elastic_systematic: np.ndarray
     half_width_systematic: np.ndarray
     elastic_errors: np.ndarray = field(repr=False)
+    placed_errors: np.ndarray = field(repr=False)
 
     def interval(self, part: str) -> tuple[float, float]:
         """Return the interval of the mean over angles of `elastic` or `half_width`, from the scatter of the repeats [N m].
@@ -144,6 +153,15 @@ class PassiveCurve:
         """Return the slope of the straight line through the elastic mean of every repeat [N m/rad], on angles that all of them cover."""
         angle, values = self._shared("elastic")
         return np.polyfit(angle, values.T, 1)[0] if len(angle) > 1 else np.full(len(values), np.nan)
+
+    def placed(self) -> dict[str, float]:
+        """Return the standard deviations of `half_width` [N m] and `stiffness` [N m/rad] from markers that every session places anew."""
+        there = np.isfinite(self.placed_errors).all(axis=(0, 1))
+        if there.sum() < 2:
+            return {}
+        elastic, half_width = self.placed_errors[:, :, there]
+        slopes = np.polyfit(self.angle[there], elastic.T, 1)[0]
+        return {"half_width": float(np.linalg.norm(half_width.mean(axis=1))), "stiffness": float(np.linalg.norm(slopes))}
 
     def _means(self, part: str) -> np.ndarray:
         """Return the mean of every repeat over the angles that all of them cover, none where there is no such angle."""
@@ -213,7 +231,7 @@ class PassiveMoments(Tabular):
         return f"PassiveMoments({self.dataset.name!r}; {'; '.join(parts) or 'no joint moved in both directions'})"
 
     def followed(self) -> tuple[Estimate, ...]:
-        """Return what a history keeps, with intervals from the scatter of the repeats.
+        """Return what a history keeps, with intervals from the scatter of the repeats and from markers, which every session places anew.
 
         For each configuration and joint the mean half width of the hysteresis [N m], the stiffness [N m/rad] and the range that was moved
         through [rad]; for each pair of joints their coupling [N m/rad].
@@ -225,13 +243,14 @@ class PassiveMoments(Tabular):
                 for m in self.trials
                 if m.trial.configuration == curve.configuration
             ]
+            placed = curve.placed()
             quantities = {
                 "half_width": (curve._means("half_width"), "N m"),
                 "stiffness": (curve.stiffness(), "N m/rad"),
                 "range": (np.array([np.ptp(angles) for angles in own if angles.size]), "rad"),
             }
             found += [
-                _estimate(f"{name} in {curve.configuration}", curve.joint, _interval(values), unit)
+                _estimate(f"{name} in {curve.configuration}", curve.joint, _interval(values, placed.get(name, 0.0)), unit)
                 for name, (values, unit) in quantities.items()
             ]
         found += [_estimate(f"coupling {c.joints[0]}-{c.joints[1]}", None, c.interval, "N m/rad") for c in self.couplings]
@@ -252,11 +271,12 @@ class PassiveMoments(Tabular):
         return {"curves": [c.to_dict() for c in self.curves], "warnings": list(self.warnings)}
 
 
-def _interval(values: np.ndarray) -> tuple[float, float]:
-    """Return the interval of the mean of repeats by Student's t; NaN for fewer than two."""
+def _interval(values: np.ndarray, shared: float = 0.0) -> tuple[float, float]:
+    """Return the interval of the mean of repeats by Student's t, with a standard deviation that they share; NaN for fewer than two."""
     if len(values) < 2:
         return (float("nan"), float("nan"))
     mean, half = float(values.mean()), students_t.quantile(LEVEL, len(values) - 1) * float(values.std(ddof=1)) / np.sqrt(len(values))
+    half = float(np.hypot(half, 1.96 * shared))
     return (mean - half, mean + half)
 
 
@@ -317,7 +337,7 @@ def passive_moments(
             curve = _curve(dataset, repeats, joint, bins)
             if curve is not None:
                 curves.append(curve)
-            elif any(_moves(m.q[:, joint]) for m in repeats):
+            elif any(directions.moves(m.q[:, joint]) for m in repeats):
                 lost.append(f"{joint + 1}")
         if lost:
             warnings.append(
@@ -398,7 +418,7 @@ def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments
             inertial[piece] += _carried(unit, angle, _armrs.smooth(np.ascontiguousarray(trial.base[piece]), trial.rate, cutoff)[2])
         moment[piece] = torque - inertial[piece]
     moment[~trial.valid] = np.nan
-    direction = _direction(q, qd, np.isfinite(moment), round(MARGIN * trial.rate / cutoff))
+    direction = directions.told(q, qd, np.isfinite(moment), round(MARGIN * trial.rate / cutoff))
     return TrialMoments(trial, q, qd, moment, inertial, direction, seen, sign)
 
 
@@ -413,34 +433,6 @@ def _carried(unit: _armrs.Arm, q: np.ndarray, acceleration: np.ndarray) -> np.nd
     """
     turned = q + np.eye(1, q.shape[1]) * np.pi / 2.0
     return np.asarray(acceleration[:, :1] * unit.gravity(turned) + acceleration[:, 1:] * unit.gravity(q))
-
-
-def _direction(q: np.ndarray, qd: np.ndarray, known: np.ndarray, margin: int) -> np.ndarray:
-    """Tell in which direction each joint moves; one that is held rests, whatever its noise.
-
-    `margin` samples beside every reversal count as rest: there the low-pass mixes both directions. So do those of unknown moment.
-    """
-    result = np.zeros(q.shape, dtype=int)
-    for j in range(q.shape[1]):
-        there = np.isfinite(qd[:, j])
-        if not _moves(q[:, j]):
-            continue
-        least = MOVING * np.percentile(np.abs(qd[there, j]), 90.0)
-        signs = np.where(there & (np.abs(qd[:, j]) > least), np.sign(qd[:, j]), 0.0)
-        for sign in (-1, 1):
-            result[_deep_inside(signs == sign, margin) & known[:, j], j] = sign
-    return result
-
-
-def _moves(angle: np.ndarray) -> bool:
-    there = np.isfinite(angle)
-    return bool(there.any() and np.ptp(angle[there]) >= LEAST_RANGE)
-
-
-def _deep_inside(own: np.ndarray, margin: int) -> np.ndarray:
-    """Return the samples that have `margin` of their like on both sides."""
-    window = 2 * margin + 1
-    return np.convolve(own, np.ones(window), mode="same") > window - 0.5 if window <= len(own) else np.zeros(len(own), dtype=bool)
 
 
 def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCurve | None:
@@ -459,7 +451,9 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     # A mean over other repeats at the next angle would jump by what differs between them.
     shared = np.isfinite(elastic[np.isfinite(elastic).any(axis=1)]).all(axis=0)
     kept = np.where(shared, 0.0, np.nan) if shared.any() else np.zeros(bins)
-    systematic = _systematic(dataset, repeats, joint, edges)
+    errors = _systematic(dataset, repeats, joint, edges, repeated.slope(repeated.mean(elastic), edges))
+    declared = len(uncertainty.Deviations.of(dataset).vector(dataset.model.n_joints))
+    systematic = [part[:declared] for part in errors]
     moved = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
     inertial, moment = (np.concatenate(part) for part in zip(*moved, strict=True))
     return PassiveCurve(
@@ -480,27 +474,35 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
         elastic_systematic=uncertainty.by_jacobian(systematic[0]),
         half_width_systematic=uncertainty.by_jacobian(systematic[1]),
         elastic_errors=systematic[0],
+        placed_errors=np.array([part[declared:] for part in errors]),
     )
 
 
-def _systematic(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what errors that all samples of all repeats share do to elastic mean and half width, each (n_errors, n_bins)."""
+def _systematic(
+    dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, edges: np.ndarray, stiffness: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what errors that all samples of all repeats share do to elastic mean and half width, each (n_errors, n_bins).
+
+    First those that are declared, as `Deviations.vector` orders them, then those of `uncertainty.placements`.
+    """
     deviations = uncertainty.Deviations.of(dataset)
-    parts = [_shifts(dataset, m, joint, edges, deviations) for m in repeats]
+    parts = [_shifts(dataset, m, (joint, stiffness), edges, deviations) for m in repeats]
     rising, falling = (np.array([repeated.mean(errors) for errors in np.stack([part[k] for part in parts], axis=1)]) for k in (0, 1))
     return 0.5 * (rising + falling), 0.5 * (rising - falling)
 
 
 def _shifts(
-    dataset: Dataset, moments: TrialMoments, joint: int, edges: np.ndarray, deviations: uncertainty.Deviations
+    dataset: Dataset, moments: TrialMoments, spring: tuple[int, float], edges: np.ndarray, deviations: uncertainty.Deviations
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what each shared error of its size does to the moment of a repeat, by direction, each (n_errors, n_bins)."""
-    model = dataset.model_of(moments.trial.configuration)
+    model, joint = dataset.model_of(moments.trial.configuration), spring[0]
     there = np.isfinite(moments.q).all(axis=1) & (moments.direction[:, joint] != 0)
-    values = np.full((len(deviations.vector(model.n_joints)), len(moments.q)), np.nan)
+    values = np.full((len(deviations.vector(model.n_joints)) + 4 * model.n_joints, len(moments.q)), np.nan)
     if there.any():
         force = None if moments.force is None else moments.force[there]
-        values[:, there] = uncertainty.sensitivity(model, moments.q[there], force, deviations)[:, :, joint]
+        declared = uncertainty.sensitivity(model, moments.q[there], force, deviations)
+        placed = uncertainty.placements(model, moments.q[there], force, deviations, declared, spring)
+        values[:, there] = np.concatenate([declared[:, :, joint], placed])
     rising, falling = (np.array([_binned(moments, row, joint, sign, edges) for row in values]) for sign in (1, -1))
     return rising, falling
 

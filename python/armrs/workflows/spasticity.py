@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..analysis import stretches
+from ..analysis.directions import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
 from ..analysis.stretches import Reflex, Stretch
 from ..analysis.uncertainty import Deviations, angle_errors, sensitivity
@@ -24,7 +25,7 @@ from ..model import Model
 from ..tabular import Tabular, Tidy
 from ..telling import telling
 from .identify import Estimate
-from .passive import LEAST_RANGE, TrialMoments, trial_moments
+from .passive import TrialMoments, trial_moments
 
 DEFAULT_CUTOFF = 4.0
 """Cutoff of the low-pass [Hz]: above it, inertia times the noise of angles would be taken for latency (0.05° gave 6 ms at 8 Hz)."""
@@ -224,7 +225,7 @@ def spasticity(
         fitted = stretches.fit([s for _, s in own])
         if fitted is None:
             continue
-        seen = [_seen(m, s, fitted, k, whole) for k, (m, s) in enumerate(own)]
+        seen = [_seen(m, s, fitted, k, dataset) for k, (m, s) in enumerate(own)]
         found.append(JointReflex(joint + 1, fitted, tuple(sorted(seen, key=lambda s: s.speed))))
         warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
     if not found:
@@ -285,7 +286,7 @@ def low_pass(rate: float, cutoff: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda values: _armrs.smooth(np.ascontiguousarray(values[:, None]), rate, cutoff)[0][:, 0]
 
 
-def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, session: Sequence[Trial]) -> StretchSeen:
+def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, session: Dataset) -> StretchSeen:
     """Return what one stretch of a session shows: from where the joint begins to move in the direction that is resisted, to its turn."""
     along = fitted.direction * stretch.qd
     peak = int(np.argmax(along))
@@ -303,6 +304,8 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
         (t for name in moments.trial.emg if (t := onset(moments.trial, name, *span_s)) is not None),
         default=np.nan,
     )
+    place = [t.file for t in session.trials].index(moments.trial.file)
+    both = co_contraction(session.trials, place, *span_s, session.muscles)
     # The slow low-pass widens a stretch, and with it the time for which it is beyond the threshold.
     over = fitted.direction * stretch.fine_qd[span] > shape["threshold"].value
     passed = float(stretch.t[first + int(np.argmax(over))]) if over.any() else np.nan
@@ -319,9 +322,7 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
         catch_speed=np.nan if begun is None else float(along[begun]),
         emg_onset=float(emg - stretch.t[first]),
         emg_latency=float(emg - passed),
-        co_contraction=np.nan
-        if (both := co_contraction(session, [t.file for t in session].index(moments.trial.file), *span_s)) is None
-        else both,
+        co_contraction=np.nan if both is None else both,
     )
 
 

@@ -115,6 +115,8 @@ pub struct Local<T> {
     pub proximal_q: T,
     /// Magnitude of the force through the joint \[N\].
     pub joint_force: T,
+    /// Activity of the muscles that move the joint: 0 at rest, 1 in a maximal voluntary contraction.
+    pub activity: T,
     /// The effect's own states, zero at the start.
     pub memory: States<T>,
 }
@@ -130,6 +132,7 @@ impl<T: Scalar> Local<T> {
             qdd: T::ZERO,
             proximal_q: T::ZERO,
             joint_force: T::ZERO,
+            activity: T::ZERO,
             memory: [T::ZERO; MAX_STATES],
         }
     }
@@ -173,6 +176,8 @@ pub trait Law {
     const CROSSES: bool = false;
     /// Whether it looks at [`Local::joint_force`].
     const FEELS_FORCE: bool = false;
+    /// Whether it looks at [`Local::activity`].
+    const FEELS_ACTIVITY: bool = false;
     /// What it acts on.
     const ACTS_ON: ActsOn = ActsOn::at(Self::INFO.place);
     /// Whether its torque is a constant, or one whose sign alone follows the motion: what a quasi-static analysis can find.

@@ -80,6 +80,10 @@ macro_rules! catalogue {
             pub fn feels_force(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Own(own) => own.feels_force() }
             }
+            /// Whether it depends on the activity of muscles, which something must tell.
+            pub const fn feels_activity(self) -> bool {
+                match self { $(Self::$law => <$module::$law as Law>::FEELS_ACTIVITY,)* Self::Own(_) => false }
+            }
         }
 
         impl<T: Scalar> Effect<T> {
@@ -205,7 +209,9 @@ catalogue! {
     load_friction::LoadFriction,
     quadratic_drag::QuadraticDrag,
     angle_viscosity::AngleViscosity,
+    active_viscosity::ActiveViscosity,
     elastic::Elastic,
+    active_stiffness::ActiveStiffness,
     cubic_elastic::CubicElastic,
     relaxation::Relaxation,
     thixotropy::Thixotropy,
@@ -400,10 +406,12 @@ pub struct Motion<T, const N: usize> {
     pub qdd: Joints<T, N>,
     /// Magnitude of the force through each joint \[N\].
     pub joint_force: [T; N],
+    /// Activity of the muscles that move each joint: 0 at rest, 1 in a maximal voluntary contraction.
+    pub activity: [T; N],
 }
 
 impl<T: Scalar, const N: usize> Motion<T, N> {
-    /// A motion without accelerations and joint forces.
+    /// A motion without accelerations, joint forces and muscle activity.
     pub fn new(time: T, q: Joints<T, N>, qd: Joints<T, N>) -> Self {
         Self {
             time,
@@ -411,6 +419,7 @@ impl<T: Scalar, const N: usize> Motion<T, N> {
             qd,
             qdd: joints([T::ZERO; N]),
             joint_force: [T::ZERO; N],
+            activity: [T::ZERO; N],
         }
     }
 
@@ -435,6 +444,7 @@ impl<T: Scalar, const N: usize> Motion<T, N> {
                 T::ZERO
             },
             joint_force: at(&self.joint_force),
+            activity: at(&self.activity),
             memory,
         }
     }

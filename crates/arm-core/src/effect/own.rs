@@ -91,7 +91,7 @@ impl Own {
         at: &Local<T>,
         f: impl Fn(&Parameters<f64>, &Local<f64>) -> f64,
     ) -> T {
-        const SEEN: usize = MAX_PARAMETERS + 6;
+        const SEEN: usize = MAX_PARAMETERS + 7;
         const ALL: usize = SEEN + MAX_STATES;
         let mut values = [T::ZERO; ALL];
         values[..MAX_PARAMETERS].copy_from_slice(p);
@@ -102,12 +102,13 @@ impl Own {
             at.qdd,
             at.proximal_q,
             at.joint_force,
+            at.activity,
         ]);
         values[SEEN..].copy_from_slice(&at.memory);
         T::together(values, |v: [f64; ALL]| {
             let mut p = [0.0; MAX_PARAMETERS];
             p.copy_from_slice(&v[..MAX_PARAMETERS]);
-            let [time, q, qd, qdd, proximal_q, joint_force] =
+            let [time, q, qd, qdd, proximal_q, joint_force, activity] =
                 core::array::from_fn(|k| v[MAX_PARAMETERS + k]);
             let at = Local {
                 time,
@@ -116,6 +117,7 @@ impl Own {
                 qdd,
                 proximal_q,
                 joint_force,
+                activity,
                 memory: core::array::from_fn(|k| v[SEEN + k]),
             };
             f(&p, &at)

@@ -104,6 +104,7 @@ fn middle<T: Scalar>(a: &Local<T>, b: &Local<T>) -> Local<T> {
         qdd: mean(a.qdd, b.qdd),
         proximal_q: mean(a.proximal_q, b.proximal_q),
         joint_force: mean(a.joint_force, b.joint_force),
+        activity: mean(a.activity, b.activity),
         memory: [T::ZERO; MAX_STATES],
     }
 }

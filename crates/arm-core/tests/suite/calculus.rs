@@ -164,6 +164,7 @@ fn effect_gradients_are_derivatives() {
                     qdd: of(local.qdd),
                     proximal_q: of(local.proximal_q),
                     joint_force: of(local.joint_force),
+                    activity: of(local.activity),
                     memory: local.memory.map(of),
                 });
                 if kind.info().kind != "motor_inertia" {

@@ -8,8 +8,8 @@ use arm_core::{Contact, Invalid, Joints, Pose, Reading, Setup, inverse_dynamics}
 use crate::common::Random;
 
 /// The stable names, as files and reports use them.
-const NAMES: &str = "viscous coulomb stribeck load_friction quadratic_drag angle_viscosity elastic cubic_elastic \
-    relaxation thixotropy constant_moment end_range biarticular biarticular_end_range stretch_reflex tremor voluntary \
+const NAMES: &str = "viscous coulomb stribeck load_friction quadratic_drag angle_viscosity \
+    active_viscosity elastic active_stiffness cubic_elastic relaxation thixotropy constant_moment end_range biarticular biarticular_end_range stretch_reflex tremor voluntary \
     motor_inertia added_mass gravity_moment inertia segment_length gravity_tilt shoulder_motion shoulder_heave \
     backlash contact_compliance contact_damping robot_ripple force_bias force_drift force_gain \
     force_misalignment angle_offset time_delay handle_slip";

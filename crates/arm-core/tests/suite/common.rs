@@ -60,6 +60,7 @@ impl Random {
         let mut motion = Motion::new(self.uniform(0.0, 2.0), self.joints(2.0), self.joints(2.0));
         motion.qdd = self.joints(5.0);
         motion.joint_force = core::array::from_fn(|_| self.uniform(0.0, 30.0));
+        motion.activity = core::array::from_fn(|_| self.uniform(0.0, 1.0));
         motion
     }
 }

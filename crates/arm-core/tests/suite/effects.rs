@@ -29,6 +29,7 @@ const REST: Local<f64> = Local {
     qdd: 0.0,
     proximal_q: 0.0,
     joint_force: 0.0,
+    activity: 0.0,
     memory: [0.0; 3],
 };
 const fn moving(qd: f64) -> Local<f64> {

@@ -115,6 +115,7 @@ fn effects<const L: usize>(seed: u64) {
                 qd: joints(&motions.map(|m| m.qd)),
                 qdd: joints(&motions.map(|m| m.qdd)),
                 joint_force: core::array::from_fn(|i| wide(|lane| motions[lane].joint_force[i])),
+                activity: core::array::from_fn(|i| wide(|lane| motions[lane].activity[i])),
             };
             let state = core::array::from_fn(|k| wide(|lane| memory[lane][k]));
             let torque = resisting_torque(&[effect], &motion, &[state]);

@@ -1,5 +1,6 @@
 //! Tests of arm-core: identities between two independent ways, limits, arithmetic in the head, refused inputs.
 
+mod activity;
 mod anthropometry;
 mod body;
 mod calculus;

@@ -92,7 +92,9 @@ fn an_arm_with_other_values_moves_as_they_say() {
             ..motion
         };
         let expected = weight + resisting_torque(&effects, &still, &memory());
-        assert!((rest - expected).norm() < 1e-9);
+        // The exponentials of the end stops reach 1e9.
+        let off = (rest - expected).norm() / expected.norm().max(1.0);
+        assert!(off < 1e-12, "{off}");
     }
 }
 

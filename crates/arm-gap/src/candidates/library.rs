@@ -227,6 +227,7 @@ fn holds_at_rest(kind: Kind) -> bool {
         qdd: 1.0,
         proximal_q: 0.5,
         joint_force: 1.0,
+        activity: 1.0,
         memory: [1.0; MAX_STATES],
     };
     let gradient = effect.gradient(&starting);

@@ -99,6 +99,7 @@ pub fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
                 moment_on_arm: None,
                 torque: None,
                 base: None,
+                activity: None,
                 handle: Some(
                     (0..count)
                         .map(|i| {

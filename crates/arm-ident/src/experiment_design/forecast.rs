@@ -3,7 +3,7 @@
 //! A movement is simulated in the closed chain, its rows are those of [`joint`](crate::inference::joint_method), and noise of force and angle sensors is carried
 //! through them to a covariance `H⁻¹ M H⁻¹`.
 
-use arm_core::effect::{Motion, resisting_torque};
+use arm_core::effect::resisting_torque;
 use arm_core::{Joints, Limits, Pose, Robot, Setup, Shape, jacobian};
 use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Recording, Start, simulate};
 
@@ -326,7 +326,7 @@ fn noise_of<const N: usize>(
         .zip(forces)
         .enumerate()
         .map(|(i, (((q, qd), qdd), &f))| {
-            let moving = |q: &Joints<f64, N>| Motion::new(i as f64 / trial.rate, *q, *qd);
+            let moving = |q: &Joints<f64, N>| trial.motion(i, q, qd);
             memory.advance(&moving(q), 1.0 / trial.rate);
             let residual = |q: &Joints<f64, N>| {
                 let (pose, motion) = (Pose::new(q), moving(q));

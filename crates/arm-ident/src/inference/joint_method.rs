@@ -410,7 +410,7 @@ impl<const N: usize> Task<'_, N> {
 
 /// Whether the robot's angles alone tell how a trial moved: its path is known, and nothing else drives the arm.
 fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
-    if trial.base.is_some() {
+    if trial.base.is_some() || trial.activity.is_some() {
         return false;
     }
     let moment = trial.moment_on_arm.iter().flatten().any(|&m| m != 0.0);
@@ -494,7 +494,12 @@ fn deviations<const N: usize>(fit: &[&Trial<N>], pieces: &[&Pieces]) -> Vec<Vec<
             .filter(|(t, _)| t.configuration == configuration)
             .map(|(_, &p)| p)
             .collect();
-        match repeat_deviations(&repeats) {
+        let mut own = fit.iter().filter(|t| t.configuration == configuration);
+        let lengths = own.clone().map(|t| t.len());
+        let alike = own
+            .next()
+            .is_some_and(|first| lengths.clone().all(|n| n == first.len()));
+        match repeat_deviations::<N>(&repeats).filter(|_| alike) {
             Some(found) => all.extend(found),
             None => return Vec::new(),
         }

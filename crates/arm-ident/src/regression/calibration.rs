@@ -4,7 +4,7 @@
 //! force that the *model* predicts, never from the measured one: a column that carries the noise of the right-hand side
 //! would explain that noise, and the fit would buy it with a wrong gain and parameters shrunk to match.
 
-use arm_core::effect::{Motion, resisting_torque};
+use arm_core::effect::resisting_torque;
 use arm_core::{Joints, Plane, Pose, Scalar, gravity, inverse_dynamics, jacobian, static_torque};
 
 use crate::regression::internal_state::InternalStates;
@@ -70,7 +70,7 @@ impl<const N: usize> Prediction<N> {
         }
         let (q, qd, qdd) = (&motion.q[i], &motion.qd[i], &motion.qdd[i]);
         let pose = Pose::new(q);
-        let seen = Motion::new(i as f64 / trial.rate, *q, *qd);
+        let seen = trial.motion(i, q, qd);
         self.memory.advance(&seen, 1.0 / trial.rate);
         let torque = inverse_dynamics(&motion.felt(&model.chain, i), &pose, qd, qdd)
             + resisting_torque(&model.fitted, &seen, &self.memory.fitted)
@@ -106,8 +106,7 @@ pub(crate) fn influence<const N: usize>(
     let pose = Pose::new(&motion.q[i]);
     match what {
         Imperfection::AngleOffset(joint) => {
-            let time = i as f64 / trial.rate;
-            angle_offset(model, motion, (force.here, memory, i, time), joint)
+            angle_offset(model, (trial, motion, i), (force.here, memory), joint)
         }
         Imperfection::ForceBias(channel) => {
             let mut unit = [0.0; 2];
@@ -142,8 +141,8 @@ pub(crate) fn influence<const N: usize>(
 /// The measured angle is the true one plus the offset: the row moves against the offset, and springs of the joints with it.
 fn angle_offset<const N: usize>(
     model: &Model<N>,
-    motion: &Kinematics<N>,
-    (force, memory, i, time): (Plane<f64>, &InternalStates<N>, usize, f64),
+    (trial, motion, i): (&Trial<N>, &Kinematics<N>, usize),
+    (force, memory): (Plane<f64>, &InternalStates<N>),
     joint: usize,
 ) -> Joints<f64, N> {
     /// Half of the step of the central difference \[rad\]: its square is the error of truncation, rounding over it about 1e-11.
@@ -152,7 +151,7 @@ fn angle_offset<const N: usize>(
     let row = |shift: f64| {
         let mut q = motion.q[i];
         q[joint] += shift;
-        let (pose, moving) = (Pose::new(&q), Motion::new(time, q, motion.qd[i]));
+        let (pose, moving) = (Pose::new(&q), trial.motion(i, &q, &motion.qd[i]));
         inverse_dynamics(&chain, &pose, &motion.qd[i], &motion.qdd[i])
             + resisting_torque(&model.fitted, &moving, &memory.fitted)
             + resisting_torque(&model.held, &moving, &memory.held)

@@ -233,7 +233,7 @@ impl<const N: usize> Sample<N> {
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let torque = trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i]);
         let joint = joint_force(chain, &pose, (qd, qdd), force);
-        let mut seen = Motion::new(i as f64 / trial.rate, *q, *qd).with_joint_force(&joint);
+        let mut seen = trial.motion(i, q, qd).with_joint_force(&joint);
         seen.qdd = *qdd;
         Self {
             pose,

@@ -1,5 +1,8 @@
 //! From raw rows to those that are fitted: the common low-pass, decimation, and weights.
 
+use core::array::from_fn;
+use std::collections::BTreeMap;
+
 use crate::error::IdentError;
 use crate::regression::measured_motion::low_pass;
 use crate::regression::rows::Rows;
@@ -179,15 +182,17 @@ pub fn filtered<const N: usize>(
 }
 
 /// Indices of the samples to keep, a list for each stretch that is at least `margin` away from gaps and ends.
+///
+/// They stand on one grid, so that repeats of which some have gaps are compared at the same samples.
 fn kept_samples(valid: &[bool], margin: usize, step: usize) -> Vec<Vec<usize>> {
     let mut pieces = Vec::new();
     let mut current: Vec<usize> = Vec::new();
-    let mut start = 0;
+    let mut start = 0_usize;
     for i in 0..=valid.len() {
         if i < valid.len() && valid[i] {
             continue;
         }
-        let mut at = start + margin;
+        let mut at = margin + start.div_ceil(step) * step;
         while at + margin < i {
             current.push(at);
             at += step;
@@ -382,29 +387,49 @@ fn redundancy<const N: usize>(pieces: &[Vec<f64>]) -> Result<[f64; N], IdentErro
     Ok(out)
 }
 
-/// Deviations of what repeats measured, at rest too, from their mean, scaled by `√(n/(n−1))`.
+/// Deviations of what repeats measured, at rest too, from their mean, scaled by `√(n/(n−1))`; stretches of the samples that all have.
 ///
 /// * `repeats` - filtered rows of trials of one movement
 ///
-/// `None` unless there are at least three, all with the same samples in one piece.
-pub fn repeat_deviations(repeats: &[&Pieces]) -> Option<Vec<Vec<f64>>> {
-    let n = repeats.len();
-    let first = repeats.first()?.first()?;
-    if n < 3
-        || repeats
-            .iter()
-            .any(|p| p.len() != 1 || p[0].samples != first.samples)
-    {
+/// `None` unless there are at least three, and samples that all have.
+pub fn repeat_deviations<const N: usize>(repeats: &[&Pieces]) -> Option<Vec<Vec<f64>>> {
+    let n = repeats.len() as f64;
+    if repeats.len() < 3 {
         return None;
     }
-    let mean = |i: usize| repeats.iter().map(|p| p[0].measured(i)).sum::<f64>() / n as f64;
-    let correction = libm::sqrt(n as f64 / (n as f64 - 1.0));
-    let means: Vec<f64> = (0..first.rhs.len()).map(mean).collect();
-    let deviation = |p: &&Pieces| {
-        let apart = means.iter().enumerate().map(|(i, m)| p[0].measured(i) - m);
-        apart.map(|v| v * correction).collect()
+    // What each measured at a sample, if it has it.
+    let own = |pieces: &Pieces| -> BTreeMap<usize, [f64; N]> {
+        let each = |rows: &Rows| {
+            let at = |k: usize| from_fn(|j| rows.measured(k * N + j));
+            let samples = rows.samples.iter().enumerate();
+            samples.map(|(k, &i)| (i, at(k))).collect::<Vec<_>>()
+        };
+        pieces.iter().flat_map(each).collect()
     };
-    Some(repeats.iter().map(deviation).collect())
+    let repeats: Vec<BTreeMap<usize, [f64; N]>> = repeats.iter().map(|p| own(p)).collect();
+    let shared: Vec<usize> = repeats[0]
+        .keys()
+        .filter(|i| repeats.iter().all(|own| own.contains_key(i)))
+        .copied()
+        .collect();
+    let step = shared.windows(2).map(|w| w[1] - w[0]).min()?;
+    let mut all = Vec::new();
+    for stretch in shared.chunk_by(|a, b| b - a == step) {
+        if stretch.len() <= SHORTEST {
+            continue;
+        }
+        let mean = |i: usize, j: usize| repeats.iter().map(|own| own[&i][j]).sum::<f64>() / n;
+        let means: Vec<[f64; N]> = stretch.iter().map(|&i| from_fn(|j| mean(i, j))).collect();
+        let correction = libm::sqrt(n / (n - 1.0));
+        let apart = |own: &BTreeMap<usize, [f64; N]>| {
+            let sample = |(&i, means): (&usize, &[f64; N])| -> [f64; N] {
+                from_fn(|j| (own[&i][j] - means[j]) * correction)
+            };
+            stretch.iter().zip(&means).flat_map(sample).collect()
+        };
+        all.extend(repeats.iter().map(apart));
+    }
+    (!all.is_empty()).then_some(all)
 }
 
 /// Residual of rows at given parameters, joint-interleaved.
@@ -416,4 +441,49 @@ pub fn residual(rows: &Rows, x: &[f64]) -> Vec<f64> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A repeat of one joint that measures `value` at every kept sample.
+    fn repeat(valid: &[bool], value: impl Fn(usize) -> f64) -> Pieces {
+        let rows = |samples: Vec<usize>| Rows {
+            columns: Vec::new(),
+            rhs: samples.iter().map(|&i| value(i)).collect(),
+            samples,
+            fits: None,
+            held: None,
+        };
+        kept_samples(valid, 10, 4).into_iter().map(rows).collect()
+    }
+
+    #[test]
+    fn a_gap_of_one_repeat_leaves_the_scatter_of_the_samples_that_all_have() {
+        let whole = vec![true; 400];
+        let mut broken = whole.clone();
+        broken[150..203].fill(false);
+        let course = |offset: f64| move |i: usize| 0.3 * i as f64 + offset;
+        let (a, b) = (repeat(&whole, course(0.0)), repeat(&whole, course(3.0)));
+        let c = repeat(&broken, course(-3.0));
+        let deviations = repeat_deviations::<1>(&[&a, &b, &c]).expect("shared samples");
+        // Two stretches of three repeats, whose deviations are 0, 3 and -3 times √(3/2).
+        assert_eq!(deviations.len(), 6);
+        let count: usize = deviations[..3].iter().map(Vec::len).sum();
+        assert_eq!(count, 3 * c[0].samples.len());
+        for (values, offset) in deviations.iter().zip([0.0, 3.0, -3.0].iter().cycle()) {
+            assert!(
+                values
+                    .iter()
+                    .all(|v| (v - offset * 1.5_f64.sqrt()).abs() < 1e-12)
+            );
+        }
+        // The scatter is that of whole repeats.
+        let all = [&a, &b, &repeat(&whole, course(-3.0))];
+        let complete = repeat_deviations::<1>(&all).expect("shared samples");
+        let scatter = [&deviations, &complete].map(|d| second_moments::<1>(d)[0][0]);
+        assert!((scatter[0] - scatter[1]).abs() < 1e-12);
+        assert!(repeat_deviations::<1>(&[&a, &c]).is_none());
+    }
 }

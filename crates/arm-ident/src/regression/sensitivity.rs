@@ -5,7 +5,7 @@
 //! then follow an unknown twice, directly and through the motion. The second part comes from the equation of motion linearised
 //! along the run, `M q̈ + D q̇ + (K + Jᵀ S J) q = −Y`.
 
-use arm_core::effect::{Effect, Motion, resisting_torque};
+use arm_core::effect::{Effect, resisting_torque};
 use arm_core::{Joints, Plane, Pose, inertia, inverse_dynamics, jacobian, static_torque};
 use arm_sim::{Change, Recording, Slopes, cubic_weights};
 use nalgebra::SMatrix;
@@ -189,7 +189,7 @@ impl<const N: usize> Answers<'_, N> {
         let model = self.model;
         let force = fine.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
         let (q, qd, qdd) = (motion.q[i], motion.qd[i], motion.qdd[i]);
-        let moving = |q: &_, qd: &_| Motion::new(i as f64 / fine.rate, *q, *qd);
+        let moving = |q: &_, qd: &_| fine.motion(i, q, qd);
         self.memory.advance(&moving(&q, &qd), 1.0 / fine.rate);
         let memory = &self.memory;
         let left = |q: &_, qd: &_, qdd: &Joints<f64, N>| {

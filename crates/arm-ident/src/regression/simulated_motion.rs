@@ -32,7 +32,7 @@ const SAME_MOVEMENT: f64 = 0.15;
 /// The run that the model makes along the handle's path of a trial.
 ///
 /// # Errors
-/// [`IdentError`] when the handle's path is not known, the simulation stops, or it moves elsewhere than the measured arm.
+/// [`IdentError`] when the handle's path is not known or something else acts with it, the simulation stops, or it moves elsewhere than the measured arm.
 pub(crate) fn simulated<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
@@ -40,6 +40,9 @@ pub(crate) fn simulated<const N: usize>(
 ) -> Result<Course<N>, IdentError> {
     if trial.base.is_some() {
         return Err(IdentError::MovingBase);
+    }
+    if trial.activity.is_some() {
+        return Err(IdentError::MuscleActivity);
     }
     let Some(handle) = &trial.handle else {
         return Err(IdentError::Numerics(NumericsError::TooFew {

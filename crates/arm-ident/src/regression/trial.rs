@@ -1,6 +1,6 @@
 //! What a trial brings: uniformly sampled channels, already in SI units and with the force named by what it acts on.
 
-use arm_core::effect::Effect;
+use arm_core::effect::{Effect, Motion};
 use arm_core::{Chain, Contact, Joints, Plane};
 pub use arm_model::Tolerance;
 
@@ -36,6 +36,8 @@ pub struct Trial<const N: usize> {
     pub handle: Option<Vec<Plane<f64>>>,
     /// Position of the first joint \[m\], where its path was measured; else it rests where the model says.
     pub base: Option<Vec<Plane<f64>>>,
+    /// Activity of the muscles that move each joint, where it was measured, see [`Motion::activity`]; else the arm is at rest.
+    pub activity: Option<Vec<[f64; N]>>,
     /// False where a sample was missing and filled in.
     pub valid: Vec<bool>,
 }
@@ -53,6 +55,7 @@ impl<const N: usize> Trial<N> {
             torque: None,
             handle: None,
             base: None,
+            activity: None,
             valid: vec![true; q.len()],
             q,
         }
@@ -66,6 +69,15 @@ impl<const N: usize> Trial<N> {
     /// Whether the trial has no sample.
     pub fn is_empty(&self) -> bool {
         self.q.is_empty()
+    }
+
+    /// An arm that moves at a sample, as effects see it; without accelerations and joint forces.
+    pub fn motion(&self, i: usize, q: &Joints<f64, N>, qd: &Joints<f64, N>) -> Motion<f64, N> {
+        let mut motion = Motion::new(i as f64 / self.rate, *q, *qd);
+        if let Some(activity) = &self.activity {
+            motion.activity = activity[i];
+        }
+        motion
     }
 
     /// Whether no torque and no force acts on the arm during the whole trial.

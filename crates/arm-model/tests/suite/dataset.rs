@@ -94,7 +94,7 @@ const BROKEN: &[(&str, &str, &str)] = &[
     (
         "force_on",
         "forces_on",
-        ": found unknown key 'forces_on', allowed added, force_on, model, name, sample_rate, subject, synthetic, tolerance, trial (nearest known: force_on)",
+        ": found unknown key 'forces_on', allowed added, force_on, model, muscle, name, sample_rate, subject, synthetic, tolerance, trial (nearest known: force_on)",
     ),
     (
         "repeat = 1",

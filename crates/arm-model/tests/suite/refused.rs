@@ -268,7 +268,7 @@ fn what_is_no_model_is_refused() {
     let kind = MODEL.replace("\"coulomb\"", "\"coulom\"");
     let refused = refusal(&kind);
     assert!(refused.starts_with(
-        "[[effect]] 1 (coulom), kind: found unknown kind of effect 'coulom', allowed added_mass, "
+        "[[effect]] 1 (coulom), kind: found unknown kind of effect 'coulom', allowed active_stiffness, "
     ));
     assert!(refused.ends_with("(nearest known: coulomb)"));
     assert!(

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use super::class::{built, table, value_class, wraps};
+use super::muscle::Muscle;
 use super::whole::{each, one, path_of};
 use crate::errors::refused;
 
@@ -354,6 +355,8 @@ value_class!(
 ///     Whether the trials were simulated.
 /// added : sequence of AddedMass
 ///     Masses that are worn in some configurations besides the model.
+/// muscles : sequence of Muscle
+///     Muscles whose activity is recorded.
 ///
 /// Raises
 /// ------
@@ -367,8 +370,8 @@ pub struct Description(pub arm_model::Description);
 impl Description {
     #[new]
     #[pyo3(
-        signature = (name, model, trials, force_on=None, sample_rate=None, subject=None, tolerance=None, synthetic=None, added=None),
-        text_signature = "(name, model, trials, force_on=None, sample_rate=None, subject=Subject(), tolerance=Tolerance(), synthetic=False, added=())"
+        signature = (name, model, trials, force_on=None, sample_rate=None, subject=None, tolerance=None, synthetic=None, added=None, muscles=None),
+        text_signature = "(name, model, trials, force_on=None, sample_rate=None, subject=Subject(), tolerance=Tolerance(), synthetic=False, added=(), muscles=())"
     )]
     #[expect(
         clippy::too_many_arguments,
@@ -384,6 +387,7 @@ impl Description {
         tolerance: Option<Any<'_, '_>>,
         synthetic: Option<Any<'_, '_>>,
         added: Option<Any<'_, '_>>,
+        muscles: Option<Any<'_, '_>>,
     ) -> PyResult<Self> {
         let list = |tables: Vec<Table>| Value::List(tables.into_iter().map(Value::Table).collect());
         let trials = each("trials", trials, |entry: &TrialEntry| entry.0.to_table())?;
@@ -411,6 +415,12 @@ impl Description {
             given.push(
                 "added",
                 list(each("added", added, |a: &AddedMass| a.0.to_table())?),
+            );
+        }
+        if let Some(muscles) = muscles {
+            given.push(
+                "muscle",
+                list(each("muscles", muscles, |m: &Muscle| m.0.to_table())?),
             );
         }
         built("", given.into())
@@ -482,6 +492,12 @@ impl Description {
         let added = self.0.added.iter().cloned().map(AddedMass);
         PyTuple::new(py, added.collect::<Vec<_>>())
     }
+    /// Muscles whose activity is recorded.
+    #[getter]
+    fn muscles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let muscles = self.0.muscles.iter().cloned().map(Muscle);
+        PyTuple::new(py, muscles.collect::<Vec<_>>())
+    }
 }
 
 value_class!(
@@ -495,7 +511,8 @@ value_class!(
         ("subject", ""),
         ("tolerance", ""),
         ("synthetic", ""),
-        ("added", "")
+        ("added", ""),
+        ("muscles", "")
     ]
 );
 

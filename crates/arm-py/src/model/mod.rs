@@ -3,6 +3,7 @@
 mod class;
 mod dataset;
 mod effect;
+mod muscle;
 mod parameter;
 mod parts;
 mod value;
@@ -11,6 +12,7 @@ mod whole;
 pub(crate) use class::{Attribute, Wraps, reduced, replaced, shown};
 pub use dataset::{AddedMass, Description, Subject, Tolerance, TrialEntry};
 pub use effect::Effect;
+pub use muscle::Muscle;
 pub use parameter::{ParameterId, ParameterInfo};
 pub use parts::{Contact, Joint, Robot, Segment};
 pub use whole::{Model, each, load_model, one};
@@ -30,6 +32,7 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<Tolerance>()?;
     m.add_class::<Subject>()?;
     m.add_class::<AddedMass>()?;
+    m.add_class::<Muscle>()?;
     m.add_class::<TrialEntry>()?;
     m.add_class::<Description>()?;
     m.add_function(wrap_pyfunction!(load_model, m)?)

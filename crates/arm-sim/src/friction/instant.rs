@@ -174,7 +174,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         Self {
             model,
             input,
-            motion: Motion::new(input.time, *q, *qd),
+            motion: input.motion(q, qd),
             contact: model.contact(input, q, qd, &pose),
             driving: model.driving(input, &pose),
             form: Form::at(model, &pose, qd),

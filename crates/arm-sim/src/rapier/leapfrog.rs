@@ -118,7 +118,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         next: &Input<f64, N>,
     ) -> Result<Sample<N>, usize> {
         let (model, now, dt) = (self.model, self.bodies, self.dt);
-        let mut motion = Motion::new(input.time, now.q, self.speeds.joints);
+        let mut motion = input.motion(&now.q, &self.speeds.joints);
         motion.joint_force = self.joint_force;
         let resisting = model.resisting(&motion, &self.memory);
         let (pull, damping) = match &model.link {
@@ -166,6 +166,7 @@ impl<'a, const N: usize> Arm<'a, N> {
                 qd: after.qd,
                 qdd: reaction.change / dt,
                 joint_force: through,
+                activity: core::array::from_fn(|j| 0.5 * (input.activity[j] + next.activity[j])),
             },
         };
         self.advance(after, reaction);

@@ -1,6 +1,7 @@
 //! Tests of arm-sim: order and energy of the integrators, long runs, limits, lanes against single runs, refused inputs.
 
 mod accuracy;
+mod activity;
 mod batch;
 mod chosen_step;
 mod common;

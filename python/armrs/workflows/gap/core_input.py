@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ... import _armrs, checks
+from ...catalogue import catalogue
+from ...errors import BadInput
 from ...io.dataset import Dataset, refuse_other_arms
 from ...io.trial import Trial
 from ...model import Model, Tolerance
@@ -46,6 +48,13 @@ class SearchSettings:
 def core_trials(dataset: Dataset) -> list[Trial]:
     """Return the trials for the core."""
     refuse_other_arms(dataset)
+    for effect in dataset.model.all_effects:
+        if catalogue()[effect.kind].feels_activity:
+            found, allowed = (
+                effect.kind,
+                "effects that act alike in all repeats: no two have the same muscle activity; identify fits this one",
+            )
+            raise BadInput("effects of the model", found, allowed, file=dataset.model_path)
     return [bridged(t) for t in dataset.trials]
 
 
