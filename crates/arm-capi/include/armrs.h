@@ -114,7 +114,7 @@ enum armrs_status
   ARMRS_UNKNOWN = 6,
   // The monitor has stopped the device.
   ARMRS_STOPPED = 7,
-  // An effect acts on the rig or the sensors, and not on an arm.
+  // An effect acts on the rig or the sensors, or depends on muscle activity: an arm alone has none.
   ARMRS_CANNOT_ACT = 8,
   // An arm that cannot be: a tonne, a centre of mass far beyond its segment.
   ARMRS_IMPLAUSIBLE = 9,
@@ -481,7 +481,7 @@ ARMRS_MUST_USE armrs_real armrs_panic_control(const armrs_real *table, size_t in
 #endif
 
 // The effect of the catalogue with a name such as "coulomb", at a joint (or segment) counted from zero, with its default
-// values. ARMRS_CANNOT_ACT for those of the rig and the sensors, ARMRS_UNKNOWN for a name that does not exist.
+// values. ARMRS_CANNOT_ACT for those of the rig, the sensors and active muscles, ARMRS_UNKNOWN for a name that does not exist.
 //
 // # Safety
 // `name` is null or a string that ends with zero; `effect` is null or points to an effect.
@@ -494,7 +494,7 @@ armrs_status armrs_effect_named(const char *name,
 //
 // `segments`: ARMRS_JOINTS of them, proximal first. `effects`: `count` of them, at most ARMRS_EFFECTS. Those that act on the
 // arm itself (added_mass, gravity_moment, inertia, segment_length, motor_inertia, gravity_tilt) become part of it; those of
-// the joints stay effects, and their states start at zero. Those of the rig and of the sensors are refused with
+// the joints stay effects, and their states start at zero. Those of the rig, of the sensors and of active muscles are refused with
 // ARMRS_CANNOT_ACT. An arm that cannot be is ARMRS_IMPLAUSIBLE: a segment longer than 3 m or heavier than 200 kg, a centre of
 // mass more than a quarter of the length beyond its segment, a radius of gyration above twice the length, gravity above
 // 30 m/s^2. `problem`, if not null, says what was refused.

@@ -83,7 +83,7 @@ pub struct Kept {
 held!(armrs_arm holds Kept, b"arm  0.1");
 
 /// The effect of the catalogue with a name such as "coulomb", at a joint (or segment) counted from zero, with its default
-/// values. ARMRS_CANNOT_ACT for those of the rig and the sensors, ARMRS_UNKNOWN for a name that does not exist.
+/// values. ARMRS_CANNOT_ACT for those of the rig, the sensors and active muscles, ARMRS_UNKNOWN for a name that does not exist.
 ///
 /// # Safety
 /// `name` is null or a string that ends with zero; `effect` is null or points to an effect.
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn armrs_effect_named(
         let (number, kind) = found
             .find(|(_, kind)| kind.info().kind.as_bytes() == name)
             .ok_or(ARMRS_UNKNOWN)?;
-        if matches!(kind.acts_on(), ActsOn::Rig | ActsOn::Sensors) {
+        if kind.needs_more_than_an_arm() {
             return Err(ARMRS_CANNOT_ACT);
         }
         *effect = armrs_effect {
@@ -122,7 +122,7 @@ pub unsafe extern "C" fn armrs_effect_named(
 ///
 /// `segments`: ARMRS_JOINTS of them, proximal first. `effects`: `count` of them, at most ARMRS_EFFECTS. Those that act on the
 /// arm itself (added_mass, gravity_moment, inertia, segment_length, motor_inertia, gravity_tilt) become part of it; those of
-/// the joints stay effects, and their states start at zero. Those of the rig and of the sensors are refused with
+/// the joints stay effects, and their states start at zero. Those of the rig, of the sensors and of active muscles are refused with
 /// ARMRS_CANNOT_ACT. An arm that cannot be is ARMRS_IMPLAUSIBLE: a segment longer than 3 m or heavier than 200 kg, a centre of
 /// mass more than a quarter of the length beyond its segment, a radius of gyration above twice the length, gravity above
 /// 30 m/s^2. `problem`, if not null, says what was refused.

@@ -24,7 +24,7 @@ pub enum armrs_status {
     ARMRS_UNKNOWN = 6,
     /// The monitor has stopped the device.
     ARMRS_STOPPED = 7,
-    /// An effect acts on the rig or the sensors, and not on an arm.
+    /// An effect acts on the rig or the sensors, or depends on muscle activity: an arm alone has none.
     ARMRS_CANNOT_ACT = 8,
     /// An arm that cannot be: a tonne, a centre of mass far beyond its segment.
     ARMRS_IMPLAUSIBLE = 9,
@@ -115,7 +115,7 @@ impl From<Invalid> for Refusal {
             Invalid::OutOfReach { distance, min, max } => Self::named(status, ["distance", ""], 0)
                 .numbers([distance, min, max].map(|v| v as armrs_real)),
             Invalid::Unknown { name } => Self::named(status, [name, ""], 0),
-            Invalid::CannotAct { .. } => Self::named(status, ["does not act on an arm", ""], 0),
+            Invalid::CannotAct { .. } => Self::named(status, ["needs more than an arm", ""], 0),
             _ => Self::named(status, ["", ""], 0),
         }
     }

@@ -95,7 +95,7 @@ impl fmt::Display for Invalid {
                 )
             }
             Self::CannotAct { kind } => {
-                write!(f, "`{kind}` does not act on the arm itself")
+                write!(f, "`{kind}` needs more than an arm")
             }
             Self::Unknown { name } => write!(f, "unknown {name}"),
         }

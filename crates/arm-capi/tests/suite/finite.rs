@@ -24,6 +24,7 @@ fn replaced(at: usize, value: armrs_real) -> armrs_motion {
 fn arms_with_all_effects() -> Vec<armrs_arm> {
     arm_core::effect::KINDS
         .iter()
+        .filter(|kind| !kind.needs_more_than_an_arm())
         .map(|kind| kind.info())
         .filter(|info| info.place == arm_core::effect::Place::Joint)
         .map(|info| named(&std::ffi::CString::new(info.kind).unwrap(), 1))

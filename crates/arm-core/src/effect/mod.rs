@@ -84,6 +84,10 @@ macro_rules! catalogue {
             pub const fn feels_activity(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::FEELS_ACTIVITY,)* Self::Own(_) => false }
             }
+            /// Whether it acts on the rig or the sensors, or depends on what nothing tells of an arm by itself.
+            pub fn needs_more_than_an_arm(self) -> bool {
+                matches!(self.acts_on(), ActsOn::Rig | ActsOn::Sensors) || self.feels_activity()
+            }
         }
 
         impl<T: Scalar> Effect<T> {
@@ -454,7 +458,7 @@ impl<T: Scalar, const N: usize> Motion<T, N> {
 ///
 /// # Errors
 /// The index of the first effect that is refused, and why: a value outside its bounds, an arm that cannot be, or one that
-/// acts on the rig or the sensors, which an arm alone does not have ([`Invalid::CannotAct`]).
+/// needs more than an arm ([`Kind::needs_more_than_an_arm`], [`Invalid::CannotAct`]).
 pub fn applied<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     effects: &[Effect<T>],
@@ -462,16 +466,13 @@ pub fn applied<T: Scalar, const N: usize>(
     let mut setup = Setup::new(chain, Contact::new([T::ZERO; 2], [T::ZERO; 2]));
     for (index, effect) in effects.iter().enumerate().filter(|(_, e)| e.on) {
         effect.validate(N).map_err(|why| (index, why))?;
-        match effect.kind.acts_on() {
-            ActsOn::Joints => {}
-            ActsOn::Arm => {
-                effect.alter(&mut setup);
-                setup.chain().map_err(|why| (index, why))?;
-            }
-            ActsOn::Rig | ActsOn::Sensors => {
-                let kind = effect.kind.info().kind;
-                return Err((index, Invalid::CannotAct { kind }));
-            }
+        if effect.kind.needs_more_than_an_arm() {
+            let kind = effect.kind.info().kind;
+            return Err((index, Invalid::CannotAct { kind }));
+        }
+        if effect.kind.acts_on() == ActsOn::Arm {
+            effect.alter(&mut setup);
+            setup.chain().map_err(|why| (index, why))?;
         }
     }
     setup.chain().map_err(|why| (0, why))
