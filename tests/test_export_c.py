@@ -132,7 +132,7 @@ def test_every_kind_reaches_the_device_or_is_refused_by_name(kind: str) -> None:
     effect = Effect(kind, joint, "Fy" if about.address == "channel" else None, {p.name: _value(p) for p in about.parameters})
     plain = true_model().replace(effects=())
     model = plain.replace(effects=(effect,))
-    if about.where in ("contact",) or kind in ("shoulder_motion", "shoulder_heave", "force_drift"):
+    if about.where == "contact" or about.feels_activity or kind in ("shoulder_motion", "shoulder_heave", "force_drift"):
         with pytest.raises(BadInput, match=kind):
             export_c(model)
         return
