@@ -140,7 +140,7 @@ impl<const N: usize> Part<'_, N> {
         }
         let qd = &self.before.qd;
         // Friction of the instant, unless a joint force was in it.
-        let known = (!self.model.feels_joint_force).then_some(self.first.most);
+        let known = (!self.model.feels_joint_force).then_some(self.first.dry.most);
         let yielding = OnceCell::new();
         let yields = || *yielding.get_or_init(|| arm.yielding());
         // The speeds to which joints may slow down within a length: slower joints are in steeper friction.
@@ -187,18 +187,20 @@ impl<const N: usize> Part<'_, N> {
             let [start, middle, end] = &parts;
             Inputs { start, middle, end }
         };
-        let (mut begun, mut last) = (false, self.first);
+        let (mut begun, mut last) = (false, self.first.dry);
         let h = (to - self.from) * self.h;
         rk4(
             self.model,
             (h, inputs),
             (state, memory),
             |input, q, qd, memory| {
-                if begun {
-                    last = Arm::at(self.model, input, (q, qd)).solve(memory, (&self.modes, None));
+                if !begun {
+                    begun = true;
+                    return self.first.outcome;
                 }
-                begun = true;
-                last.outcome
+                let solved = Arm::at(self.model, input, (q, qd)).solve(memory, (&self.modes, None));
+                last = solved.dry;
+                solved.outcome
             },
         );
         for joint in (0..N).filter(|&j| self.first.held[j]) {
@@ -211,7 +213,7 @@ impl<const N: usize> Part<'_, N> {
         self.margin(state, &last)
     }
 
-    fn margin(&self, state: &State<f64, N>, last: &Solved<N>) -> f64 {
+    fn margin(&self, state: &State<f64, N>, last: &Friction<f64, N>) -> f64 {
         let mut margin = f64::INFINITY;
         for j in 0..N {
             let distance = match self.modes[j] {
@@ -241,7 +243,7 @@ impl<const N: usize> Part<'_, N> {
         after: (f64, f64),
         (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
     ) -> f64 {
-        let before = self.margin(&self.before, &self.first).max(1e-9);
+        let before = self.margin(&self.before, &self.first.dry).max(1e-9);
         let mut tried = after.0;
         let found = first_beyond([(self.from, before), after], |to| {
             tried = to;
@@ -287,7 +289,7 @@ fn implicit<const N: usize>(
             before + h * now.outcome.qdd[j]
         };
         // An impulse takes energy by the mean of the speeds before and after it.
-        power[2] += now.dry[j] * 0.5 * (after - before);
+        power[2] += now.dry.torque[j] * 0.5 * (after - before);
         state.qd[j] = after;
         state.q[j] += h * (before + share * (after - before));
     }

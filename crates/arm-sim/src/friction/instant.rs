@@ -27,17 +27,14 @@ pub(crate) type Modes<const N: usize> = [Mode; N];
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Solved<const N: usize> {
     pub outcome: Outcome<f64, N>,
-    /// Torque with which dry friction resists \[N m\].
-    pub dry: Joints<f64, N>,
-    /// Most that it could be \[N m\].
-    pub most: [f64; N],
+    pub dry: Friction<f64, N>,
     /// The joints that stick.
     pub held: [bool; N],
     /// Joint in which the friction has no single answer, and what it adds to itself.
     pub jam: Option<(usize, f64)>,
 }
 
-/// Dry friction of all joints, as it is recorded.
+/// Dry friction of all joints.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Friction<T, const N: usize> {
     /// Torque with which it resists \[N m\].
@@ -82,16 +79,12 @@ pub(crate) fn at<const N: usize>(
         return (model.evaluate(input, moving.0, moving.1, memory), None);
     }
     let (_, solved) = Arm::at(model, input, moving).modes(memory, None);
-    let friction = Friction {
-        torque: solved.dry,
-        most: solved.most,
-    };
-    (solved.outcome, Some(friction))
+    (solved.outcome, Some(solved.dry))
 }
 
 /// How far what holds a joint is from the most that it can be, as a share of that.
-pub(crate) fn reserve<const N: usize>(solved: &Solved<N>, joint: usize) -> f64 {
-    let (most, held) = (solved.most[joint], solved.dry[joint].abs());
+pub(crate) fn reserve<const N: usize>(dry: &Friction<f64, N>, joint: usize) -> f64 {
+    let (most, held) = (dry.most[joint], dry.torque[joint].abs());
     if most > 0.0 {
         1.0 + ROUNDING - held / most
     } else {
@@ -215,8 +208,8 @@ impl<'a, const N: usize> Arm<'a, N> {
                     let steady = rate.abs() < LED_STEADY;
                     Some(Mode::Slips(if steady { 0.0 } else { rate.signum() }))
                 }
-                Mode::Sticks if reserve(&solved, j) < 0.0 => {
-                    Some(Mode::Slips(solved.dry[j].signum()))
+                Mode::Sticks if reserve(&solved.dry, j) < 0.0 => {
+                    Some(Mode::Slips(solved.dry.torque[j].signum()))
                 }
                 Mode::Slips(way) if way * (solved.outcome.qdd[j] + speed(j)) < 0.0 => {
                     Some(Mode::Sticks)
@@ -313,8 +306,10 @@ impl<'a, const N: usize> Arm<'a, N> {
                 power: powers((found.answer.force, v), [driving, &all], qd, lost),
                 joint_force: motion.joint_force,
             },
-            dry: found.dry,
-            most: found.most,
+            dry: Friction {
+                torque: found.dry,
+                most: found.most,
+            },
             held: found.held,
             jam: found.jam,
         }
