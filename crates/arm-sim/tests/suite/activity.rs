@@ -1,13 +1,11 @@
 //! Effects that depend on muscle activity, which a series tells.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Contact, Joints, Segment, Setup};
 use arm_sim::{
-    Drive, Experiment, Integrator, Interpolation, Port, Series, Start, Stepper, digest, simulate,
-    simulate_batch,
+    Experiment, Integrator, Interpolation, Port, Series, Stepper, digest, simulate, simulate_batch,
 };
 
-use crate::common::{largest, run, smooth};
+use crate::common::{largest, run, smooth, swinging};
 
 /// Stiffness, torque and viscosity of a maximal contraction.
 const MAXIMAL: [f64; 3] = [6.0, 4.0, 0.8];
@@ -54,20 +52,7 @@ fn a_constant_activity_is_a_spring_and_a_damper() {
 
 #[test]
 fn a_pendulum_whose_muscle_grows_active_follows_its_own_equation() {
-    let (mass, com, inertia, gravity) = (1.3, 0.21, 0.02, 9.81);
-    let segment = Segment {
-        length: 0.4,
-        mass,
-        com: [com, 0.0],
-        inertia,
-    };
-    let chain = arm_core::Chain::new([segment], [0.0; 2], [0.0, -gravity]).expect("a chain");
-    let setup = Setup::new(&chain, Contact::new([0.0; 2], [0.0; 2]));
-    let mut experiment = Experiment::new(setup, Drive::Torque(None), 2.0);
-    experiment.start = Start::Given {
-        q: Joints::<f64, 1>::repeat(-1.2),
-        qd: Joints::zeros(),
-    };
+    let ([mass, com, inertia, gravity], mut experiment) = swinging();
     experiment.effects = active(0).to_vec();
     let ramp = Series::new(
         "activity",

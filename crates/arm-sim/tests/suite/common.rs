@@ -1,8 +1,8 @@
 //! Experiments and comparisons that several tests use.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Shape, models};
-use arm_sim::{Experiment, Recording, simulate};
+use arm_core::{Chain, Contact, Joints, Segment, Setup, Shape, models};
+use arm_sim::{Drive, Experiment, Recording, Start, simulate};
 
 /// The human arm led by a handle whose path is smooth enough for a fourth-order method.
 pub fn smooth(duration: f64) -> Experiment<3> {
@@ -34,6 +34,25 @@ pub fn several_effects() -> Vec<Effect<f64>> {
         Effect::new(Kind::ShoulderMotion, 0).with(&[0.01, 0.02, -1.1]),
         Effect::new(Kind::ShoulderHeave, 0).with(&[0.002, 0.006, 0.4, 0.3]),
     ]
+}
+
+/// Mass, distance of its centre, inertia about that, gravity; and the free pendulum that has them, let go at -1.2 rad.
+pub fn swinging() -> ([f64; 4], Experiment<1>) {
+    let (mass, com, inertia, gravity) = (1.3, 0.21, 0.02, 9.81);
+    let segment = Segment {
+        length: 0.4,
+        mass,
+        com: [com, 0.0],
+        inertia,
+    };
+    let chain = Chain::new([segment], [0.0; 2], [0.0, -gravity]).expect("a chain");
+    let setup = Setup::new(&chain, Contact::new([0.0; 2], [0.0; 2]));
+    let mut experiment = Experiment::new(setup, Drive::Torque(None), 2.0);
+    experiment.start = Start::Given {
+        q: Joints::<f64, 1>::repeat(-1.2),
+        qd: Joints::zeros(),
+    };
+    ([mass, com, inertia, gravity], experiment)
 }
 
 pub fn run<const N: usize>(experiment: &Experiment<N>) -> Recording<N> {

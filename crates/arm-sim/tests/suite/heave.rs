@@ -1,10 +1,9 @@
 //! A base that heaves, as an effect and along a measured path.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Contact, Joints, Segment, Setup};
-use arm_sim::{Drive, Experiment, Interpolation, Series, Start};
+use arm_sim::{Interpolation, Series};
 
-use crate::common::{largest, most, run, several_effects};
+use crate::common::{largest, most, run, several_effects, swinging};
 use crate::placement::placed;
 
 const WAVE: [f64; 4] = [0.03, -0.05, 0.7, 0.4];
@@ -22,20 +21,7 @@ fn heave(time: f64) -> [[f64; 2]; 2] {
 
 #[test]
 fn a_pendulum_on_a_heaving_pivot_follows_its_own_equation() {
-    let (mass, com, inertia, gravity) = (1.3, 0.21, 0.02, 9.81);
-    let segment = Segment {
-        length: 0.4,
-        mass,
-        com: [com, 0.0],
-        inertia,
-    };
-    let chain = arm_core::Chain::new([segment], [0.0; 2], [0.0, -gravity]).expect("a chain");
-    let setup = Setup::new(&chain, Contact::new([0.0; 2], [0.0; 2]));
-    let mut experiment = Experiment::new(setup, Drive::Torque(None), 2.0);
-    experiment.start = Start::Given {
-        q: Joints::<f64, 1>::repeat(-1.2),
-        qd: Joints::zeros(),
-    };
+    let ([mass, com, inertia, gravity], mut experiment) = swinging();
     experiment.effects = vec![Effect::new(Kind::ShoulderHeave, 0).with(&WAVE)];
     let recording = run(&experiment);
     // (J + m c²) q̈ = −m c ((g + z̈) cos q − ÿ sin q)
