@@ -33,14 +33,17 @@ def parted(dataset: Dataset, share: float) -> Dataset:
     return dataset.replace(trials=(part(slice(0, cut), "fit"), part(slice(cut, None), "test")))
 
 
-@pytest.mark.parametrize(("rig", "most"), [("dfki_a0", 0.135), ("dfki_c1", 0.105)])
-def test_dry_friction_at_both_joints_of_motor_driven_arms(data: Path, rig: str, most: float) -> None:
+@pytest.mark.parametrize(("rig", "most", "farthest"), [("dfki_a0", 0.135, 0.08), ("dfki_c1", 0.105, 0.03)])
+def test_dry_friction_at_both_joints_of_motor_driven_arms(data: Path, rig: str, most: float, farthest: float) -> None:
     found = armrs.find_gap(data / rig, separate=False, threads=2)
     assert {(kind in DRY, joint) for kind, joint in named(found)} == {(True, 1), (True, 2)}
     after = [found.gap[f"tau{j}_Nm"].after for j in (1, 2)]
     assert np.sqrt(np.mean(np.square(after))) <= most
     # The angles of a second of simulation with the measured torques are nearer as well.
-    assert all(found.gap[f"q{j}_rad"].after < 0.3 * found.gap[f"q{j}_rad"].calibrated for j in (1, 2))
+    runs = [found.gap[f"q{j}_rad"] for j in (1, 2)]
+    assert all(run.after < 0.4 * run.calibrated for run in runs)
+    # One of them swings up: a start that is fitted to the whole second at once is not found, and the run is off by a radian.
+    assert all(run.after < farthest for run in runs)
 
 
 def test_dry_friction_and_drag_of_a_pendulum_are_told_together_and_foretell_its_swing(data: Path) -> None:

@@ -17,6 +17,10 @@ use crate::measurement_model::prediction::{Channels, Course, STEPS};
 const SPAN: f64 = 1.0;
 /// Most steps of Gauss and Newton's method for a start.
 const TURNS: usize = 8;
+/// Shares of such a step that are tried until one brings the run nearer.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// A start is fitted to this part of its samples, one after the other.
+const PARTS: [usize; 4] = [8, 4, 2, 1];
 /// Changes of angles \[rad\] and speeds \[rad/s\] with which the start is linearised.
 pub(crate) const CHANGE: [f64; 2] = [1e-5, 1e-4];
 
@@ -81,16 +85,37 @@ impl<const N: usize> Session<N> {
         let Some(motion) = course.motion() else {
             return Ok(Vec::new());
         };
-        let count = span.min(end - start);
-        let run =
-            |state: &State<N>, count: usize| self.angles(hypothesis, course, (start, count), state);
-        let left = |shown: &Channels| -> Vec<f64> {
-            let each = (0..N).flat_map(|j| (0..count).map(move |i| (j, i)));
-            each.map(|(j, i)| motion.q[start + i][j] - shown[j][i])
-                .collect()
-        };
         let mut state = (motion.q[start], motion.qd[start]);
-        let mut residual = left(&run(&state, count)?);
+        // An arm near its upright multiplies a small error of the start by a hundred within a second, so that the whole of
+        // it is no longer a nearly linear function of the start: each fit begins where that of half as many samples ended.
+        for part in PARTS {
+            let count = span.min(end - start) / part;
+            if count > 2 * N {
+                state = self.start_of(hypothesis, course, (start, count), state)?;
+            }
+        }
+        self.angles(hypothesis, course, (start, end - start), &state)
+    }
+
+    /// The state from which a run explains so many samples best, found by Gauss and Newton's method from another.
+    fn start_of(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+        (start, count): (usize, usize),
+        mut state: State<N>,
+    ) -> Result<State<N>, SimulationError> {
+        let Some(motion) = course.motion() else {
+            return Ok(state);
+        };
+        let left = |state: &State<N>| -> Result<Vec<f64>, SimulationError> {
+            let shown = self.angles(hypothesis, course, (start, count), state)?;
+            let each = (0..N).flat_map(|j| (0..count).map(move |i| (j, i)));
+            Ok(each
+                .map(|(j, i)| motion.q[start + i][j] - shown[j][i])
+                .collect())
+        };
+        let mut residual = left(&state)?;
         for _ in 0..TURNS {
             let mut slopes = Matrix::zeros(N * count, 2 * N);
             for column in 0..2 * N {
@@ -102,29 +127,31 @@ impl<const N: usize> Session<N> {
                     &mut moved.1
                 };
                 part[column % N] += change;
-                let changed = left(&run(&moved, count)?);
-                slope_into(slopes.column_mut(column), &residual, &changed, change);
+                slope_into(slopes.column_mut(column), &residual, &left(&moved)?, change);
             }
             let Some(solver) = Cholesky::new(slopes.transpose_product(&slopes)) else {
                 break;
             };
             let step = solver.solve(&slopes.transpose_times(&residual));
-            let q = Joints::from_fn(|j, _| step[j]);
-            let qd = Joints::from_fn(|j, _| step[N + j]);
-            let next = (state.0 + q, state.1 + qd);
-            let better = left(&run(&next, count)?);
             let before = dot(&residual, &residual);
-            let gained = before - dot(&better, &better);
-            if gained <= 0.0 {
-                break;
+            let mut gained = 0.0;
+            for share in SHARES {
+                let next = (
+                    state.0 + Joints::from_fn(|j, _| share * step[j]),
+                    state.1 + Joints::from_fn(|j, _| share * step[N + j]),
+                );
+                let better = left(&next)?;
+                gained = before - dot(&better, &better);
+                if gained > 0.0 {
+                    (state, residual) = (next, better);
+                    break;
+                }
             }
-            let done = gained < 1e-6 * before;
-            (state, residual) = (next, better);
-            if done {
+            if gained < 1e-6 * before {
                 break;
             }
         }
-        run(&state, end - start)
+        Ok(state)
     }
 
     /// What the encoders read of a run from a state.
