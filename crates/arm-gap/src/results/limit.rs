@@ -42,7 +42,10 @@ pub(super) fn limits(
             continue;
         }
         for (&free, &smallest) in std::iter::zip(&one.free, &one.smallest) {
-            let at_least = smallest.is_finite().then_some(smallest);
+            // A size beyond what the catalogue allows is none: a joint that hardly moves shows a rotor of 1e10 kg m² at the earliest.
+            let allowed = &one.effect.kind.info().parameters[free];
+            let largest = allowed.max.max(-allowed.min);
+            let at_least = (smallest <= largest).then_some(smallest);
             add(
                 &mut all,
                 Limit::new(&one.effect, free, (at_least, one.gain, one.price)),
@@ -214,12 +217,15 @@ mod tests {
             ruled("viscous", 0, (0.0, 20.0, f64::INFINITY)),
             ruled("viscous", 1, (90.0, 20.0, 0.02)),
             ruled("force_bias", 1, (1.0, 20.0, 0.3)),
+            // More than the catalogue allows.
+            ruled("motor_inertia", 2, (0.0, 20.0, 2.5e10)),
         ];
         let named = [("viscous".to_owned(), Some(2), None)];
         let limits = limits(&all, &named, &[]);
         let told: Vec<_> = limits.iter().map(|l| (l.kind.as_str(), l.joint)).collect();
         let (coulomb, viscous) = (("coulomb", Some(1)), ("viscous", Some(1)));
-        assert_eq!(told, [coulomb, viscous, ("force_bias", None)]);
+        let rotor = ("motor_inertia", Some(3));
+        assert_eq!(told, [coulomb, viscous, ("force_bias", None), rotor]);
         let dry = &limits[0];
         assert_eq!((dry.gain, dry.price, dry.at_least), (8.0, 20.0, Some(0.03)));
         assert_eq!(
@@ -228,6 +234,7 @@ mod tests {
         );
         assert_eq!(limits[1].at_least, None);
         assert_eq!(limits[2].channel.as_deref(), Some("Fz"));
+        assert_eq!(limits[3].at_least, None);
     }
 
     #[test]
