@@ -12,6 +12,8 @@ use crate::selection::search_state::Settled;
 
 /// Speeds below which friction may creep \[rad/s\]; with zero it sticks.
 const SMOOTHING: [f64; 4] = [0.0, 0.003, 0.01, CREEP];
+/// Times that each of these is chosen for all laws, at most.
+const SWEEPS: usize = 3;
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Chooses for each dry law of the base and each named one the speed below which it creeps that whole fit trials show, and fits
@@ -44,6 +46,36 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.start = Some(chosen.hypothesis.clone());
         }
         self.settle(chosen.hypothesis, chosen.asked).or(Ok(settled))
+    }
+
+    /// The dry law of the base alone, where a second one is named in its joint and explains no more than its price beyond what the first
+    /// does with another speed below which it creeps: a wrong one leaves what looks like a second law. `None` where there is none.
+    ///
+    /// * `scale` - as in [`SearchState`](crate::selection::search_state::SearchState)
+    pub(crate) fn with_one_dry_law(
+        &self,
+        current: &Fitted<N>,
+        scale: f64,
+    ) -> Option<Settled<'a, N>> {
+        let base = self.dry_base_laws();
+        current.asked.iter().enumerate().find_map(|(slot, own)| {
+            own.kind().smoothed_by()?;
+            let beside = |law: &&Target| match law {
+                Target::Known(e, _) => current.hypothesis.known[*e].index == own.effect.index,
+                _ => false,
+            };
+            let &law = base.iter().find(beside)?;
+            let (mut alone, mut asked) = (current.hypothesis.clone(), current.asked.clone());
+            alone.named.remove(slot);
+            asked.remove(slot);
+            let fits = SMOOTHING.into_iter().filter_map(|speed| {
+                self.settle(alone.clone().with(law, speed), asked.clone())
+                    .ok()
+            });
+            let best = fits.min_by(|a, b| a.0.cost.total_cmp(&b.0.cost))?;
+            let price = own.price * own.spread * scale;
+            (best.0.cost < current.cost + price).then_some(best)
+        })
     }
 
     /// The smoothing of each dry law of the base that is not dropped.
@@ -82,7 +114,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.state(&point, hypothesis, asked).ok()
         };
         let mut best = simulated(fitted.hypothesis.clone()).unwrap_or_else(|| fitted.clone());
-        for &law in laws {
+        // What one joint does at rest another moves by: a choice is asked again when another one has changed since.
+        let mut since_change = 0;
+        for &law in laws.iter().cycle().take(SWEEPS * laws.len()) {
+            if since_change == laws.len() {
+                break;
+            }
+            let before = best.hypothesis.get(law);
             // From speed to speed, up or down, as long as that costs less: the misfit has one minimum along them.
             for upwards in [true, false] {
                 while let Some(next) = next_smoothing(best.hypothesis.get(law), upwards)
@@ -92,6 +130,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     best = other;
                 }
             }
+            let changed = best.hypothesis.get(law) != before;
+            since_change = if changed { 1 } else { since_change + 1 };
         }
         best
     }

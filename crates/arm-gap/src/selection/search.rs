@@ -206,10 +206,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
-        let revived = match self.with_base_revived(&state.current)? {
-            None => self.with_base_instead(&state.current)?,
-            revived => revived,
-        };
+        let mut revived = self.with_base_revived(&state.current)?;
+        if revived.is_none() {
+            revived = self.with_base_instead(&state.current)?;
+        }
+        let revived = revived.or_else(|| self.with_one_dry_law(&state.current, state.scale));
         let Some(revived) = revived else {
             return Ok(state);
         };
