@@ -49,7 +49,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// The dry law of the base alone, where a second one is named in its joint and explains no more than its price beyond what the first
-    /// does with another speed below which it creeps: a wrong one leaves what looks like a second law. `None` where there is none.
+    /// does with other speeds below which joints creep: a wrong one leaves what looks like a second law. `None` where there is none.
     ///
     /// * `scale` - as in [`SearchState`](crate::selection::search_state::SearchState)
     pub(crate) fn with_one_dry_law(
@@ -60,21 +60,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let base = self.dry_base_laws();
         current.asked.iter().enumerate().find_map(|(slot, own)| {
             own.kind().smoothed_by()?;
-            let beside = |law: &&Target| match law {
+            let is_beside = |law: &Target| match law {
                 Target::Known(e, _) => current.hypothesis.known[*e].index == own.effect.index,
                 _ => false,
             };
-            let &law = base.iter().find(beside)?;
+            if !base.iter().any(is_beside) {
+                return None;
+            }
             let (mut alone, mut asked) = (current.hypothesis.clone(), current.asked.clone());
             alone.named.remove(slot);
             asked.remove(slot);
-            let fits = SMOOTHING.into_iter().filter_map(|speed| {
-                self.settle(alone.clone().with(law, speed), asked.clone())
-                    .ok()
-            });
-            let best = fits.min_by(|a, b| a.0.cost.total_cmp(&b.0.cost))?;
+            let settled = |hypothesis| self.settle(hypothesis, asked.clone()).ok();
+            let fitted = |hypothesis| settled(hypothesis).map(|s| s.0);
+            let best = cheapest(fitted(alone)?, &base, fitted);
             let price = own.price * own.spread * scale;
-            (best.0.cost < current.cost + price).then_some(best)
+            (best.cost < current.cost + price).then(|| settled(best.hypothesis))?
         })
     }
 
@@ -113,27 +113,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let point = self.simulate_alone(&hypothesis).ok()?;
             self.state(&point, hypothesis, asked).ok()
         };
-        let mut best = simulated(fitted.hypothesis.clone()).unwrap_or_else(|| fitted.clone());
-        // What one joint does at rest another moves by: a choice is asked again when another one has changed since.
-        let mut since_change = 0;
-        for &law in laws.iter().cycle().take(SWEEPS * laws.len()) {
-            if since_change == laws.len() {
-                break;
-            }
-            let before = best.hypothesis.get(law);
-            // From speed to speed, up or down, as long as that costs less: the misfit has one minimum along them.
-            for upwards in [true, false] {
-                while let Some(next) = next_smoothing(best.hypothesis.get(law), upwards)
-                    && let Some(other) = simulated(best.hypothesis.clone().with(law, next))
-                    && is_cheaper(&other, &best)
-                {
-                    best = other;
-                }
-            }
-            let changed = best.hypothesis.get(law) != before;
-            since_change = if changed { 1 } else { since_change + 1 };
-        }
-        best
+        let present = simulated(fitted.hypothesis.clone()).unwrap_or_else(|| fitted.clone());
+        cheapest(present, laws, simulated)
     }
 
     /// The same with a named law that sticks, where that costs less once its other numbers are fitted anew.
@@ -150,6 +131,36 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             _ => fitted,
         }
     }
+}
+
+/// The fit with the smoothing of each law that costs least.
+///
+/// * `fitted` - the fit of a hypothesis, `None` where it cannot be simulated
+fn cheapest<const N: usize>(
+    mut best: Fitted<N>,
+    laws: &[Target],
+    fitted: impl Fn(Hypothesis<N>) -> Option<Fitted<N>>,
+) -> Fitted<N> {
+    // What one joint does at rest another moves by: a choice is asked again when another one has changed since.
+    let mut since_change = 0;
+    for &law in laws.iter().cycle().take(SWEEPS * laws.len()) {
+        if since_change == laws.len() {
+            break;
+        }
+        let before = best.hypothesis.get(law);
+        // From speed to speed, up or down, as long as that costs less: the misfit has one minimum along them.
+        for upwards in [true, false] {
+            while let Some(next) = next_smoothing(best.hypothesis.get(law), upwards)
+                && let Some(other) = fitted(best.hypothesis.clone().with(law, next))
+                && is_cheaper(&other, &best)
+            {
+                best = other;
+            }
+        }
+        let is_changed = best.hypothesis.get(law) != before;
+        since_change = if is_changed { 1 } else { since_change + 1 };
+    }
+    best
 }
 
 /// The next of [`SMOOTHING`] above or below a speed.
