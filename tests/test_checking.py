@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ def same(samples: np.ndarray) -> np.ndarray:
     return samples
 
 
-NO_ROBOT = "no angles of a robot, or no [robot] in the model: so all trials are compared by joint torques"
+NO_ROBOT = "no [robot] in the model and no robot angles (qr1, qr2): so all trials are compared by joint torques"
 """What is said of a session that is sound but for that."""
 
 
@@ -63,7 +64,9 @@ def besides(problems: Sequence[Problem]) -> list[str]:
 def test_a_sound_session_has_no_problem_but_that_it_has_no_robot(session: Path) -> None:
     problems = check_dataset(session).problems
     assert besides(problems) == []
-    assert [p.next_step for p in problems] == ["add what they lack"]  # to leave out what all of them lack leaves none
+    assert [p.next_step for p in problems] == [
+        "nothing if no robot leads the arm; otherwise add what is missing"
+    ]  # to leave all of them out leaves none
 
 
 def test_forces_on_another_clock_are_named(session: Path, tmp_path: Path) -> None:
@@ -87,6 +90,14 @@ def test_a_robot_that_stands_elsewhere_than_the_model_says_is_told(tmp_path: Pat
     assert told[0] == [] and len(told[1]) == 1
     # The sensors of the demonstration are off by a millimetre.
     assert re.fullmatch(r"hand and handle: -2[01] mm forward and .[01] mm up from each other on average, allowed 10 mm", told[1][0])
+
+
+def test_forces_in_kilonewtons_are_not_a_wrong_body_mass_as_well(tmp_path: Path) -> None:
+    dataset = demo.measure(demo.true_model())
+    kilo = [replace(t, force_on_arm=None if t.force_on_arm is None else 1e-3 * t.force_on_arm) for t in dataset.trials]
+    told = [p.text for p in check_dataset(armrs.write_dataset(dataset.replace(trials=tuple(kilo)), tmp_path / "kilo")).problems]
+    assert sum("(kN labelled as N?)" in text for text in told) == 1
+    assert not [text for text in told if "times the masses" in text]
 
 
 def test_every_problem_is_listed_with_its_next_step(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -290,9 +290,7 @@ def test_what_a_trial_without_robot_angles_costs_is_said(tmp_path: Path, capsys:
     assert line in capsys.readouterr().err
     none = data.replace(trials=tuple(dataclasses.replace(t, robot_q=None) for t in data.trials))
     [line] = examine(none, led=False)
-    assert line.startswith(
-        "no angles of a robot, or no [robot] in the model: so all trials are compared by joint torques in measured motion"
-    )
+    assert line.startswith("no robot angles (qr1, qr2): so all trials are compared by joint torques in measured motion")
     assert examine(data, led=True) == []
 
 

@@ -155,7 +155,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     tell("clocks", 0.6)
     problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
-    return Checked(_feasible(dict.fromkeys(problems), dataset), _abilities(dataset, blocked), dataset)
+    return Checked(_feasible(dict.fromkeys(_not_implied(problems)), dataset), _abilities(dataset, blocked), dataset)
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
@@ -224,10 +224,21 @@ _WARNINGS = (
     ("a joint that is held", "nothing, if the joint was held; else repair its sensor"),
     ("begin them at one", "cut the trials at a rest"),
     ("at a higher rate", "record the robot at a higher rate, or let it start and stop smoothly"),
-    ("are compared by joint torques", "add what they lack, or leave these trials out"),
+    ("are compared by joint torques", "nothing if no robot leads the arm; otherwise add what is missing, or leave these trials out"),
     ("no model is named", "nothing, or name a model of your own: model = in dataset.toml"),
 )
 """By words of a warning, what to do about it."""
+
+
+_OF_VALUES = ("times the masses", "hand and handle", "at a higher rate")
+"""Words of warnings that are computed with the angles and forces as given."""
+
+
+def _not_implied(problems: Iterable[Problem]) -> list[Problem]:
+    """Return problems without the warnings that only follow from an error: of columns that hold something else no weight can be told."""
+    told = list(problems)
+    misread = any(p.level == "error" and ("if read otherwise" in p.text or "from the robot's handle" in p.text) for p in told)
+    return [p for p in told if not (misread and p.level == "warning" and any(words in p.text for words in _OF_VALUES))]
 
 
 def _feasible(problems: Iterable[Problem], dataset: Dataset) -> tuple[Problem, ...]:

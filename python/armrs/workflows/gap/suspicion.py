@@ -93,8 +93,12 @@ def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
         return []
     forces = ", ".join(t.file for t in dataset.trials if t.force_on_arm is None)
     not_told = f"{_NOT_TOLD}; {_NO_FORCES}" if forces else _NOT_TOLD
-    if dataset.model.robot is None or not any(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials):
-        return [f"no angles of a robot, or no [robot] in the model: {_BY_TORQUES}. {not_told}"]
+    absent = {
+        "[robot] in the model": dataset.model.robot is None,
+        "robot angles (qr1, qr2)": not any(t.robot_q is not None for t in dataset.trials),
+    }
+    if any(absent.values()):
+        return [f"no {' and no '.join(name for name, lacks in absent.items() if lacks)}: {_BY_TORQUES}. {not_told}"]
     angles = ", ".join(t.file for t in dataset.trials if t.robot_q is None)
     missing = [f"no {what} in {files}" for what, files in (("robot angles", angles), ("contact forces", forces)) if files]
     return [f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack. {not_told}"]
