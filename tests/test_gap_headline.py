@@ -121,10 +121,14 @@ def test_a_trial_stands_beside_what_is_not_decided_in_it() -> None:
     )
 
 
-def test_many_effects_are_named_by_kind() -> None:
+def test_many_effects_are_named_by_kind(monkeypatch: pytest.MonkeyPatch) -> None:
     springs = [effect("elastic", j, ("stiffness", 1.0, 0.1, "N m/rad")) for j in (3, 1, 2)]
     said = headline(result("explained", *springs, DRY))
     assert said.startswith("The model lacks 4 effects (elastic in joints 1, 2 and 3; coulomb in joint 2): with them, ")
+    monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
+    torn = {**DRY, "decided": False, "alternatives": [{"kind": "stribeck", "joint": 2, "channel": None}]}
+    said = headline(result("explained", *springs, torn))
+    assert "joints 1, 2 and 3; dry friction in joint 2 (coulomb or stribeck: not told apart)): with them, " in said
 
 
 def test_nothing_is_claimed_that_was_not_tested() -> None:
@@ -133,7 +137,10 @@ def test_nothing_is_claimed_that_was_not_tested() -> None:
     assert headline(result("nothing_missing", gap=near)).endswith("every channel is off by what repeats differ by.")
     assert headline(result("nothing_missing", gap=wider)).endswith("every channel is off by at most 1.3 times what repeats differ by.")
     assert "cannot be tested" in headline(result("nothing_missing", z=None))
-    assert headline(result("explained", DRY, gap={})).endswith("there is no test trial to measure the gap on.")
+    untested = {"q2_rad": dict.fromkeys(("before", "calibrated", "after", "floor"))}
+    for kept in ({}, untested):
+        assert headline(result("explained", DRY, gap=kept)).endswith("; there is no test trial to measure the gap on.")
+        assert "held-out" not in headline(result("nothing_missing", gap=kept))
     assert headline(result("unexplained")).startswith("Something is missing that the catalogue has no name for: on held-out trials")
 
 

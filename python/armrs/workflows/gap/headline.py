@@ -30,6 +30,7 @@ MEANINGS = {
     "Mx": "the contact moment",
 }
 """What a channel measures, by its name without the number."""
+_NO_TEST = "there is no test trial to measure the gap on"
 _SIZED = 2
 """Effects whose sizes stand in the sentence; of more it only gives the names."""
 
@@ -76,9 +77,12 @@ def headline(result: Mapping[str, Any]) -> str:
     joints, effects = result["data"]["joints"], result["effects"]
     opened, unexplained = still_open(result), result["verdict"] == "unexplained"
     tested = result["lack_of_fit"]["amended"]["z"] is not None
+    held_out = any(g["calibrated"] for g in result["gap"].values())
     if not effects and not unexplained and not opened:
         if not tested:
             return "No effect was found that these data show; without repeats, whether what is left is noise cannot be tested."
+        if not held_out:
+            return f"Nothing is missing that these data show; {_NO_TEST}."
         return f"Nothing is missing: on held-out trials every channel is off by {_near(result['gap'])}what repeats differ by."
     if effects:
         lacks = f"The model lacks {_names(effects, joints)}"
@@ -86,8 +90,7 @@ def headline(result: Mapping[str, Any]) -> str:
     else:
         lacks = "Something is missing that the catalogue has no name for" if unexplained else "No effect of the catalogue was found"
         lacks += "" if unexplained else ", yet something is missing"
-    said = _gap(result, opened)
-    return f"{lacks}{': ' if said else ''}{said}."
+    return f"{lacks}: {_gap(result, opened)}." if held_out else f"{lacks}; {_NO_TEST}."
 
 
 def _beyond(result: Mapping[str, Any], opened: Sequence[str]) -> str:
@@ -119,7 +122,8 @@ def _names(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> str:
     for kind, places in together.items():
         where = f"joint {places[0]}" if len(places) == 1 else f"joints {joined([str(j) for j in sorted(places)])}"
         names.append(f"{kind.replace('_', ' ')} in {where}")
-    names += [_name(e, joints) for e in effects if not (e["joint"] and _decided(e) and not e.get("trial"))]
+    # The list stands in brackets: joints go by their number, so that there are no brackets within brackets within brackets.
+    names += [_name(e, ()) for e in effects if not (e["joint"] and _decided(e) and not e.get("trial"))]
     return f"{len(effects)} effects ({'; '.join(names)})"
 
 
@@ -175,8 +179,6 @@ def largest(parameters: Mapping[str, Mapping[str, Any]]) -> str | None:
 def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
     """Say what the gap of one channel does: of an open one where there is such, else of that which was widest."""
     gap = {name: g for name, g in result["gap"].items() if g["calibrated"]}
-    if not gap:
-        return "there is no test trial to measure the gap on"
     shown = [name for name in opened if name in gap]
     name = shown[0] if shown else max(gap, key=lambda n: _times(gap[n], "calibrated"))
     channel = gap[name]
