@@ -206,7 +206,8 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=5, columnspacing=1.2, handlelength=1.6)
     if changed:
         start = "Right, w" if seen.torque is not None else "W"
-        which = "the trial in which it was" if effect.trial is not None else "the test trial in which it changes most"
+        role = "test " if any(t.role == "test" for t in result.dataset.trials) else ""
+        which = "the trial in which it was" if effect.trial is not None else f"the {role}trial in which it changes most"
         text += f"{start}hat it changes in {seen.trial}, {which}: simulated with it less without it."
     if not panels:
         axes[0].set_axis_off()

@@ -172,7 +172,10 @@ def _described(columns: list[np.ndarray], values: list[np.ndarray]) -> float:
 
 
 def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.ndarray, np.ndarray | None]:
-    """Return what the effect changes in one trial: that in which it was, else the test trial in which it changes most."""
+    """Return what the effect changes in one trial: that in which it was, else the test trial in which it changes most.
+
+    Without test trials, it is the fit trial that tells most.
+    """
     data, led = result.dataset, is_led(result.dataset)
     if effect.trial is None:
         asked = [k for k, t in enumerate(data.trials) if t.role == "test"] or [telling_trial(result)]

@@ -40,7 +40,10 @@ def chance(effect: Mapping[str, Any]) -> str:
 def named(result: Mapping[str, Any]) -> list[str]:
     """Return the named effects, a line each: what it is, its formula, its size, and how likely it is by chance."""
     joints = result["data"]["joints"]
-    return [f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}; by chance {chance(e)}." for e in _by_joint(result)]
+    return [
+        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}; such a gain arises by chance {chance(e)}."
+        for e in _by_joint(result)
+    ]
 
 
 def _by_joint(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -59,7 +62,8 @@ FORMULAS = "In formulas R is the torque with which a joint resists, q is its ang
 def symbols(result: Mapping[str, Any]) -> str:
     """Return a sentence that says what the names of the channels mean."""
     names: dict[str, list[int]] = {}
-    for channel in result["gap"]:
+    measured = [channel for channel, g in result["gap"].items() if g["before"] is not None]
+    for channel in measured or result["gap"]:
         name = channel.rsplit("_", 1)[0]
         stem = name.rstrip("0123456789")
         names.setdefault(stem, []).extend([int(name[len(stem) :])] if name != stem else [])
@@ -263,8 +267,8 @@ def worth(data: Mapping[str, Any]) -> str:
     with_all = data["lack_of_fit"]["amended"]["ratio"] ** 0.5
     return (
         "Misfit without it: how far the model would be off if this one effect were left out and everything else refitted, in root mean "
-        f"square and in units of what repeats differ by. With every effect it is off by {digits(with_all, 2)}. What was set apart has no "
-        "such number."
+        f"square and in units of what repeats differ by. With every effect it is off by {digits(with_all, 2)}. Disturbances of one "
+        "trial have no such number."
     )
 
 
@@ -292,7 +296,7 @@ def gap(data: Mapping[str, Any]) -> Table:
                 "open" if name in opened else None,
             ]
         )
-    head = {"before": "as given", "calibrated": "calibrated", "after": "with the named", "floor": "repeats differ by"}
+    head = {"before": "as given", "calibrated": "calibrated", "after": "with named effects", "floor": "repeats differ by"}
     columns = ["channel", *(head[step] for step in steps), *(["gap closed"] if named else []), ""]
     # Nothing is open: there is no column for it.
     return Table(columns, rows, 1) if opened else Table(columns[:-1], [row[:-1] for row in rows], 1)
