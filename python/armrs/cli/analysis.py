@@ -136,7 +136,9 @@ def gap(
     out: MaybeFolder = None,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="A first answer only: calibrate, and list what may be missing; nothing is named or written below -o."),
+        typer.Option(
+            "--quick", help="A first answer only: calibrate, and list what may be missing; nothing is named, and -o is not written."
+        ),
     ] = False,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; all cores when absent. The result does not depend on it.")] = None,
     history: HistoryFile = None,
@@ -203,7 +205,7 @@ def passive(
 ) -> int:
     """Compute passive joint moments of slow movements: elastic mean and hysteresis against the angle.
 
-    Of the model only the rigid arm counts, none of its springs, friction or other effects.
+    Only the weight and inertia of the model are subtracted, none of its springs, friction or other effects.
 
     Exit status 1 when no joint moved long enough in both directions.
     """

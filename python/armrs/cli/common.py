@@ -26,12 +26,10 @@ def _named(value: str | Path) -> Path:
 JsonFile = Annotated[
     Path | None, typer.Option("--json", metavar="FILE", parser=_named, help="Write the result as JSON; - is standard output.")
 ]
-OutFolder = Annotated[
-    Path, typer.Option("-o", "--out", metavar="DIR", parser=_named, help="Folder to write below; made when it does not exist.")
-]
+OutFolder = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", parser=_named, help="Output folder; created if it does not exist.")]
 MaybeFolder = Annotated[
     Path | None,
-    typer.Option("-o", "--out", metavar="DIR", parser=_named, help="Folder to write files and report below; made when it does not exist."),
+    typer.Option("-o", "--out", metavar="DIR", parser=_named, help="Output folder for files and report; created if it does not exist."),
 ]
 OutFile = Annotated[
     Path | None, typer.Option("-o", "--out", metavar="FILE", parser=_named, help="The FMU to write; MODEL.fmu when absent.")
