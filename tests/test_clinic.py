@@ -231,6 +231,8 @@ def test_a_resistance_that_may_be_none_is_told_as_a_limit() -> None:
     assert clinic.words_of(line)[2:4] == ["none seen", "at most 0.150"]
     named = {**curve, "joint_name": "shoulder"}
     assert verdict({"verb": "passive", "curves": [named]}) == "Half the width of the hysteresis: shoulder at most 0.15 N m (slow)."
+    negative = {**named, "half_width_mean_Nm": -0.12, "half_width_interval_Nm": [-0.15, -0.09]}
+    assert verdict({"verb": "passive", "curves": [negative]}) == "Half the width of the hysteresis: shoulder -0.12 N m (slow)."
 
 
 @pytest.mark.parametrize(

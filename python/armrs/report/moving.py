@@ -18,7 +18,7 @@ from .series import Line, Panel, series
 MOST_SAMPLES = 6000
 """Samples of a run that are looked at; of a longer one every second, third …"""
 AXES = ("forward, y", "up, z")
-SERIES = "Series to zoom and switch"
+SERIES = "Interactive time series"
 
 
 def simulated(run: Run, trial: Trial | None = None) -> Live:

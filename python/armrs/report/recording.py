@@ -54,8 +54,8 @@ def channels(trial: Trial, model: Model | None = None, section: str = "") -> Dra
 
 _CHANNELS = "{}: each channel as it was read, in the units and directions of armrs."
 _ARM = (
-    "the arm in five instants, pale to dark, with the force on it (blue) and gravity (grey). If it stands otherwise than it stood, the "
-    "angles are counted otherwise; carried at rest, the force points up."
+    "the arm in five instants, pale to dark, with the force on it (blue) and gravity (grey). If the posture is not that of the "
+    "laboratory, an angle convention is wrong. At rest, the force on a carried arm points up."
 )
 _Panel = tuple[str, np.ndarray, str]
 """Label, values and colour of a channel."""

@@ -340,7 +340,7 @@ def recorded(data: Mapping[str, Any]) -> Table:
         end = "complete" if stop is None else f"stopped at {stop['at_s']:.4f} s: {stop['what']} {stop['reason']}"
         off = trial["tracking_error_rad"]
         rows.append([trial["configuration"], str(trial["repeat"]), "yields" if off is None else f"{1e3 * off:.3g}", end])
-    return Table(["configuration", "repeat", "robot off by [mrad]", "end"], rows)
+    return Table(["configuration", "repeat", "tracking error of the robot [mrad]", "end"], rows)
 
 
 RUNS = {"run": "carried", "without_support": "not carried"}

@@ -23,10 +23,10 @@ HISTORY_MEANING = (
     "change, corrected for the number of parameters (Holm)."
 )
 PASSIVE_MEANING = (
-    "The passive moment is the torque with which a relaxed joint resists: what the contact force asks for, less gravity. "
-    "The mean of both directions is its elastic part, half their difference its dissipative part. The mean also holds what is wrong with "
-    "the masses of the model. Of the model only the rigid arm counts: what its springs, friction and other effects would add is in what is "
-    "shown, not taken off it."
+    "The passive moment is the torque with which a relaxed joint resists: the torque of the contact force, less weight and inertia. "
+    "The mean of both directions is its elastic part, half their difference its dissipative part. The mean also contains errors in the "
+    "masses of the model. Only the weight and inertia of the model are subtracted: its springs, friction and other effects remain in these "
+    "moments."
 )
 
 DEPENDENCE_MEANING = (
@@ -86,7 +86,7 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 def _identified(result: Mapping[str, Any]) -> str:
     by = [e["decided_by"] for e in result["parameters"]]
-    counts = [f"{by.count('data')} of the {len(by)} parameters", f"the model as given {by.count('prior')}"]
+    counts = [f"the measurement determines {by.count('data')}", f"the model as given {by.count('prior')}"]
     if "bound" in by:
         counts.append(f"a physical limit {by.count('bound')}")
     ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
@@ -94,7 +94,7 @@ def _identified(result: Mapping[str, Any]) -> str:
         ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
     return (
         f"The movements determine {result['rank']} of {result['unknowns']} unknowns. "
-        f"The measurement determines {', '.join(counts[:-1])} and {counts[-1]}.{ending}"
+        f"Of the {len(by)} parameters listed, {', '.join(counts)}.{ending}"
     )
 
 
@@ -118,7 +118,8 @@ def _replayed(result: Mapping[str, Any]) -> str:
 def _recorded(result: Mapping[str, Any]) -> str:
     movements = len({trial["configuration"] for trial in result["trials"]})
     ending = f"; the supervisor stopped {result['stopped']}, which are not in the data set" if result["stopped"] else ""
-    return f"{len(result['trials'])} trials of {movements} movements were simulated as a laboratory measures them{ending}."
+    of = f"{movements} movement{'s' * (movements != 1)}"
+    return f"{len(result['trials'])} trials of {of} were simulated as a laboratory measures them{ending}."
 
 
 def _coupled(result: Mapping[str, Any]) -> str:
@@ -134,7 +135,8 @@ def _passive(result: Mapping[str, Any]) -> str:
     parts = []
     for curve in result["curves"]:
         low, high = curve.get("half_width_interval_Nm") or (None, None)
-        size = f"{curve['half_width_mean_Nm']:.3g}" if low is None or not low <= 0.0 else f"at most {high:.2g}"
+        unclear = low is not None and low <= 0.0 < high
+        size = f"at most {high:.2g}" if unclear else f"{curve['half_width_mean_Nm']:.3g}"
         parts.append(f"{curve['joint_name']} {size} N m ({curve['configuration']})")
     return f"Half the width of the hysteresis: {'; '.join(parts)}."
 
@@ -213,7 +215,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     show("Parameters", tables.estimates(result["parameters"], joints, level))
     print(f"{SYMBOLS}\n{INTERVALS}\n")
     show(
-        "Calibration of the sensors, what was believed beforehand being the tolerance declared",
+        "Sensor calibration; the prior is the declared tolerance",
         tables.estimates(result["calibration"], joints, level),
     )
     show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
@@ -281,7 +283,7 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         print(line)
     for check in result["checks"]:
         print(check["text"])
-    print("Of the model only the rigid arm counts: what its effects would add is in these moments, not taken off them.")
+    print("Only the weight and inertia of the model are subtracted: its springs, friction and other effects remain in these moments.")
     followed(result)
     files_written(written)
 
