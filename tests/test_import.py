@@ -289,6 +289,22 @@ def test_a_group_of_hdf5_is_a_trial(recording: Recording, tmp_path: Path) -> Non
         assert np.abs(trial.q[: len(recording.t)] - recording.q).max() <= 1e-12
 
 
+@pytest.mark.parametrize("within", [False, True])
+def test_a_struct_of_matlab_is_a_trial_as_a_group_of_hdf5_is(within: bool, recording: Recording, tmp_path: Path) -> None:
+    """Of two structs with the same fields the first was imported, and the other was left out in silence."""
+    from scipy.io import savemat
+
+    r = recording
+    fields = {"t": r.t, "q": r.q, "Fy": r.force_on_robot[:, 0], "Fz": r.force_on_robot[:, 1]}
+    trials = dict.fromkeys(("slow_1", "slow_2"), fields)
+    savemat(tmp_path / "session.mat", {"session": trials} if within else trials)
+    done = armrs.import_recordings([tmp_path / "session.mat"], tmp_path / "session", model=KNOWN)
+    found = armrs.load_dataset(done.folder).trials
+    assert [(t.configuration, t.repeat, len(t)) for t in found] == [("slow", 1, len(r.t)), ("slow", 2, len(r.t))]
+    for trial in found:
+        assert np.abs(trial.q - r.q).max() <= 1e-12
+
+
 def test_the_offset_of_a_clock_is_found_to_a_thousandth_of_a_second(recording: Recording, tmp_path: Path) -> None:
     done = armrs.import_recordings(sorted(force_on_its_own_clock(recording, tmp_path).iterdir()), tmp_path / "session", model=KNOWN)
     (trial,) = done.recipe.trials

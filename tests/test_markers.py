@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -267,6 +268,24 @@ def test_a_reader_that_waits_for_its_turn_is_not_taken_for_one_that_hangs(tmp_pa
     monkeypatch.setattr(apart, "LONGEST", 2.0)
     with apart.content("late_reader", tmp_path / "data.bin", "anything") as arrays:
         assert arrays["size"] == 3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no processor time")
+def test_a_file_is_read_under_the_lower_limits_of_a_batch_system(tmp_path: Path) -> None:
+    """Raising a limit that the system had set ended in a traceback."""
+    (tmp_path / "small_reader.py").write_text(
+        "import resource\nfrom armrs.io import apart\n\napart.serve(lambda path: {'most': resource.getrlimit(resource.RLIMIT_CPU)})\n"
+    )
+    read = (
+        "import resource\nfrom pathlib import Path\nfrom armrs.io import apart\n\n"
+        "resource.setrlimit(resource.RLIMIT_CPU, (40, 40))\n"
+        "with apart.content('small_reader', Path('small_reader.py'), 'anything') as arrays:\n    print(*arrays['most'])\n"
+    )
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-c", read], capture_output=True, text=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, timeout=60
+    )
+    assert done.stdout.split() == ["40", "40"], done.stderr
 
 
 def test_a_first_point_that_moves_is_said_and_its_path_comes_back() -> None:

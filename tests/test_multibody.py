@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -147,6 +148,35 @@ def edited(change: Callable[[str], str]) -> Callable[[Path], Path]:
 def test_a_chain_that_is_not_planar_is_refused_by_name(change: Callable[[str], str], words: str, tmp_path: Path) -> None:
     with pytest.raises(armrs.BadInput, match=words):
         armrs.import_model(edited(change)(tmp_path))
+
+
+FOREIGN = [
+    ("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>', "<flag> gravity: found 'disable'"),
+    ("<worldbody>", '<option viscosity="5" density="1000"/><worldbody>', "<option> viscosity"),
+    ("<worldbody>", '<compiler settotalmass="30"/><worldbody>', "<compiler> settotalmass"),
+    ("<worldbody>", '<compiler inertiafromgeom="true"/><worldbody>', "<compiler> inertiafromgeom"),
+    ("<worldbody>", '<option/><option gravity="0 0 -1"/><worldbody>', "<option>: found 2 of them"),
+    ("<worldbody>", '<default/><default><joint damping="7"/></default><worldbody>', "<default>"),
+    ('name="f"', 'name="f" gravcomp="1"', "<body> gravcomp"),
+    ('<body name="f"', '<frame pos="0 0.1 0"/><body name="f"', "<body>: found <frame>"),
+    ('<body name="f"', '<attach model="m" body="b" prefix="p"/><body name="f"', "<body>: found <attach>"),
+    ("</mujoco>", '<tendon><spatial stiffness="9"><site site="hand"/></spatial></tendon></mujoco>', "<tendon>: found <spatial>"),
+    ("</mujoco>", '<tendon><fixed stiffness="1" damping="5"/></tendon></mujoco>', "<tendon>: found damping"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), FOREIGN, ids=[words for _, _, words in FOREIGN])
+def test_what_changes_the_arm_and_is_not_read_is_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
+    """All of these were left out in silence: another arm than MuJoCo's, with status 0."""
+    inertial = '<inertial pos="0 0.1 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
+    chain = f"""<mujoco><worldbody><body name="u"><joint axis="1 0 0"/>{inertial}<body name="f" pos="0 0.3 0">
+        <joint axis="1 0 0"/>{inertial}<site name="hand" pos="0 0.25 0"/></body></body></worldbody></mujoco>"""
+    path = tmp_path / "arm.xml"
+    path.write_text(chain)
+    assert len(armrs.import_model(path).segments) == 2
+    path.write_text(chain.replace(old, new, 1))
+    with pytest.raises(armrs.BadInput, match=re.escape(words)):
+        armrs.import_model(path)
 
 
 def test_opensim_balances_the_exported_arm_as_we_do(tmp_path: Path) -> None:

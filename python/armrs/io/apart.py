@@ -70,10 +70,17 @@ def _limits(path: Path) -> Callable[[], None] | None:
 
     most, seconds = _MEMORY + _MEMORY_PER_BYTE * path.stat().st_size, math.ceil(LONGEST)
 
+    def lower(kind: int, soft: int, hard: int) -> None:
+        # A batch system may have set a lower limit, which nobody but the administrator raises.
+        given = resource.getrlimit(kind)[1]
+        if given != resource.RLIM_INFINITY:
+            soft, hard = min(soft, given), min(hard, given)
+        resource.setrlimit(kind, (soft, hard))
+
     def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+        lower(resource.RLIMIT_CPU, seconds, seconds + 1)
         # Elsewhere the libraries may reserve any amount.
         if sys.platform == "linux":
-            resource.setrlimit(resource.RLIMIT_AS, (most, most))
+            lower(resource.RLIMIT_AS, most, most)
 
     return limit

@@ -18,6 +18,21 @@ from .chain import Body, Hinge, Imported, planar
 from .joints import Exported, document, laws, lost_effects, lost_robot, number, numbers, parse, vector
 
 _KNOWN_JOINT = {"name", "type", "axis", "pos", "stiffness", "springref", "damping", "frictionloss", "armature", "ref", "limited", "range"}
+_KNOWN_TENDON = {"name", "group", "user", "stiffness", "springlength"}
+_KNOWN_IN_BODY = {"joint", "freejoint", "inertial", "geom", "site", "camera", "light", "body"}
+"""What else stands in a body holds, makes or carries bodies: `frame`, `attach`, `replicate`, `composite`, `flexcomp`, `plugin`."""
+_EMPTY = ("default", "include", "equality", "actuator", "contact", "deformable", "extension")
+"""Sections that change the arm as soon as they hold anything."""
+_NEUTRAL: dict[str, dict[str, tuple[str, ...]]] = {
+    "compiler": {
+        "inertiafromgeom": ("auto", "false"), "coordinate": ("local",),
+        "boundmass": ("0",), "boundinertia": ("0",), "settotalmass": ("-1",),
+    },
+    "option": {"viscosity": ("0",), "density": ("0",), "wind": ("0 0 0",)},
+    "flag": dict.fromkeys(("gravity", "spring", "damper", "passive", "frictionloss", "constraint"), ("enable",)),
+    "body": {"gravcomp": ("0",), "mocap": ("false",)},
+}  # fmt: skip
+"""Element -> attributes that change masses, gravity or the laws of joints -> values with which they change nothing."""
 
 
 def write(model: Model) -> Exported:
@@ -97,10 +112,33 @@ def _angle(root: ET.Element) -> str:
 
 
 def _refuse_foreign(root: ET.Element) -> None:
-    for tag in ("default", "include", "equality", "actuator", "contact"):
-        element = root.find(tag)
-        if element is not None and (len(element) or element.attrib):
+    """Refuse what would change the arm and is not read: better no arm than another one."""
+    for tag in sorted({section.tag for section in root}):
+        found = root.findall(tag)
+        if tag in _EMPTY and any(len(section) or section.attrib for section in found):
             raise BadInput(f"<{tag}>", Text("elements that change the arm"), f"a file without <{tag}>: save it as MuJoCo compiled it")
+        if len(found) > 1 and tag in ("compiler", "option", "worldbody"):
+            raise BadInput(f"<{tag}>", Text(f"{len(found)} of them"), "one: save the file as MuJoCo compiled it")
+    for element in root.iter():
+        for key, neutral in _NEUTRAL.get(element.tag, {}).items():
+            if _value(element.get(key, neutral[0])) not in map(_value, neutral):
+                raise BadInput(f"<{element.tag}> {key}", element.get(key), " or ".join(neutral))
+    for parent in root.iter():
+        if parent.tag in ("worldbody", "body"):
+            for tag in sorted({child.tag for child in parent} - _KNOWN_IN_BODY):
+                raise BadInput(f"<{parent.tag}>", Text(f"<{tag}>"), "bodies within bodies: save the file as MuJoCo compiled it")
+    for tendon in root.findall("tendon/*"):
+        if tendon.tag != "fixed" or (foreign := sorted(set(tendon.keys()) - _KNOWN_TENDON)):
+            found_there = f"<{tendon.tag}>" if tendon.tag != "fixed" else ", ".join(foreign)
+            raise BadInput("<tendon>", Text(found_there), "fixed tendons with stiffness and springlength alone")
+
+
+def _value(text: str) -> list[float] | str:
+    """Return the numbers of an attribute, or its word."""
+    try:
+        return [float(part) for part in text.split()]
+    except ValueError:
+        return text
 
 
 def _place(element: ET.Element) -> np.ndarray:

@@ -26,7 +26,7 @@ def arrays_of(path: Path) -> dict[str, np.ndarray]:
     head = path.read_bytes()[:520]
     units: dict[str, str] = {}
     if HDF5 in (head[:8], head[512:520]):
-        tables = _hdf5(path, units)
+        tables = _tables(path.stem, _placed(path, units))
     elif path.suffix.lower() == ".mat":
         tables = _version_5(path)
     else:
@@ -53,14 +53,17 @@ def _version_5(path: Path) -> list[tuple[str, dict[str, np.ndarray]]]:
     if structs and all(part is not None for part in structs):
         titled = []
         for k, part in enumerate(structs, start=1):
+            placed: dict[str, np.ndarray] = {}
+            _collect("", part, placed, 0)
             arrays: dict[str, np.ndarray] = {}
-            _collect("", part, arrays, 0)
+            for place, value in placed.items():
+                arrays.setdefault(place.rsplit("/", 1)[-1], value)
             titled.append((f"{path.stem} {k}", arrays))
         return titled
     found: dict[str, np.ndarray] = {}
     for name, value in own.items():
         _collect(name, value, found, 0)
-    return [(path.stem, found)]
+    return _tables(path.stem, found)
 
 
 def _struct(value: Any) -> Any:
@@ -75,7 +78,7 @@ def _collect(name: str, value: Any, found: dict[str, np.ndarray], depth: int) ->
         return
     if hasattr(value, "_fieldnames"):
         for part in value._fieldnames:
-            _collect(part, getattr(value, part), found, depth + 1)
+            _collect(f"{name}/{part}" if name else part, getattr(value, part), found, depth + 1)
     elif isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
         _collect(name, value.flat[0], found, depth)
     else:
@@ -96,9 +99,9 @@ def _unit_of(item: Any) -> str:
     return stated.decode("utf-8", "replace") if isinstance(stated, bytes) else stated if isinstance(stated, str) else ""
 
 
-def _hdf5(path: Path, units: dict[str, str]) -> list[tuple[str, dict[str, np.ndarray]]]:
-    """Return the arrays of an HDF5 file; where groups hold arrays of the same names, as groups of trials do, each is a table."""
-    parts = [(name.split("/"), value) for name, value in _placed(path, units).items()]
+def _tables(title: str, placed: dict[str, np.ndarray]) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """Return arrays by name; where groups or structs hold arrays of the same names, as those of trials do, each is a table."""
+    parts = [(name.split("/"), value) for name, value in placed.items()]
     levels = zip(*(part[:-1] for part, _ in parts), strict=False)
     shared = len(list(takewhile(lambda level: len(set(level)) == 1, levels)))
     whole: dict[str, np.ndarray] = {}
@@ -109,8 +112,8 @@ def _hdf5(path: Path, units: dict[str, str]) -> list[tuple[str, dict[str, np.nda
         group.setdefault(part[-1], value)
         whole.setdefault(part[-1], value)
     if len(groups) > 1 and len(whole) < len(parts):
-        return [(f"{path.stem} {group}", together | arrays) for group, arrays in groups.items()]
-    return [(path.stem, whole)]
+        return [(f"{title} {group}", together | arrays) for group, arrays in groups.items()]
+    return [(title, whole)]
 
 
 def _placed(path: Path, units: dict[str, str]) -> dict[str, np.ndarray]:
