@@ -28,6 +28,16 @@ pub trait Scalar:
     fn of(value: f64) -> Self;
     /// `then` where `a < b`, else `otherwise`.
     fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
+    /// [`Scalar::if_less`] between what takes long to compute: of one number only what is asked for.
+    #[inline(always)]
+    fn where_less(
+        a: Self,
+        b: Self,
+        then: impl FnOnce() -> Self,
+        otherwise: impl FnOnce() -> Self,
+    ) -> Self {
+        Self::if_less(a, b, then(), otherwise())
+    }
     /// Whether every lane satisfies a condition.
     fn every(self, condition: impl Fn(f64) -> bool) -> bool;
     /// Whether every lane lies in a range, its ends rounded to this number and included.
@@ -50,11 +60,8 @@ pub trait Scalar:
     /// [`Scalar::sin_cos`] of several angles \[rad\]: all sines, all cosines.
     #[inline(always)]
     fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
-        let [mut sines, mut cosines] = [[Self::ZERO; K]; 2];
-        for i in 0..K {
-            (sines[i], cosines[i]) = angles[i].sin_cos();
-        }
-        [sines, cosines]
+        let both = angles.map(Self::sin_cos);
+        [both.map(|(sin, _)| sin), both.map(|(_, cos)| cos)]
     }
     /// Exponential; within 1 unit in the last place of `libm`, zero below −708.
     fn exp(self) -> Self;

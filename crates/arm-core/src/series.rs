@@ -139,6 +139,21 @@ fn series<T: Scalar>(c: &[f64], z: T) -> T {
 #[inline]
 pub(crate) fn turned(reduced: Reduced<f64>) -> (f64, f64) {
     let n = reduced.quarters.to_bits();
+    // The same where a number takes two registers, and its bits more instructions than its value.
+    if cfg!(target_pointer_width = "32") {
+        let n = n as u32;
+        let (sin, cos) = match n & 1 {
+            0 => (reduced.sin, reduced.cos),
+            _ => (reduced.cos, reduced.sin),
+        };
+        let sin = if n & 2 == 0 { sin } else { -sin };
+        let cos = if n.wrapping_add(1) & 2 == 0 {
+            cos
+        } else {
+            -cos
+        };
+        return (sin, cos);
+    }
     let (sin, cos) = (reduced.sin.to_bits(), reduced.cos.to_bits());
     let exchange = (sin ^ cos) & (n & 1).wrapping_neg();
     (
@@ -194,20 +209,40 @@ fn power_and_rest(x: f64) -> [f64; 2] {
     [f64::from_bits(exponent), rest]
 }
 
-/// Exponential; zero below −708, where it would not be a normal number.
+/// Below this the exponential would not be a normal number, and is zero.
+pub(crate) const LEAST_EXPONENT: f64 = -708.0;
+/// Beyond this the exponential is infinite.
+pub(crate) const LARGEST_EXPONENT: f64 = 710.0;
+
+/// Exponential; zero below −708.
 #[inline]
 pub(crate) fn exp(x: f64) -> f64 {
-    let inside = if x < -708.0 { -708.0 } else { x };
-    let inside = if inside > 710.0 { 710.0 } else { inside };
+    let inside = if x < LEAST_EXPONENT {
+        LEAST_EXPONENT
+    } else {
+        x
+    };
+    let value = exp_within(inside);
+    if x < LEAST_EXPONENT { 0.0 } else { value }
+}
+
+/// Exponential from −708 on.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline)]
+pub(crate) fn exp_within(x: f64) -> f64 {
+    let inside = if x > LARGEST_EXPONENT {
+        LARGEST_EXPONENT
+    } else {
+        x
+    };
     let [half, rest] = power_and_rest(inside);
-    let value = 2.0 * (half + half * rest);
-    if x < -708.0 { 0.0 } else { value }
+    2.0 * (half + half * rest)
 }
 
 /// Beyond this the hyperbolic tangent is 1 in double precision.
 pub(crate) const SATURATED: f64 = 20.0;
 
-/// Hyperbolic tangent, `(e²ˣ − 1)/(e²ˣ + 1)`.
+/// Hyperbolic tangent.
 #[inline]
 pub(crate) fn tanh(x: f64) -> f64 {
     let size = if x.abs() > SATURATED {
@@ -215,8 +250,15 @@ pub(crate) fn tanh(x: f64) -> f64 {
     } else {
         x.abs()
     };
-    let [half, rest] = power_and_rest(2.0 * size);
+    tanh_within(size).copysign(x)
+}
+
+/// Hyperbolic tangent from zero to its saturation, `(e²ˣ − 1)/(e²ˣ + 1)`.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline)]
+pub(crate) fn tanh_within(x: f64) -> f64 {
+    let [half, rest] = power_and_rest(2.0 * x);
     let power = 2.0 * half;
     let grown = power * rest + (power - 1.0);
-    (grown / (grown + 2.0)).copysign(x)
+    grown / (grown + 2.0)
 }

@@ -2,6 +2,7 @@
 
 use super::information::Row;
 use super::settings::Tuning;
+use crate::covariance::for_blocks;
 use crate::scalar::Real;
 
 /// Sums over a window of rows that the movement made meaningful.
@@ -37,14 +38,14 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
             return;
         }
         self.counts[joint] += 1;
+        let sums = &mut self.columns[joint];
         if self.counts[joint] == 1 {
-            (self.columns[joint], self.values[joint]) = (*columns, value);
-            return;
+            for_blocks(sums, columns, 0, |sum, column| *sum = column);
+            self.values[joint] = value;
+        } else {
+            for_blocks(sums, columns, 0, |sum, column| *sum += column);
+            self.values[joint] += value;
         }
-        for (sum, &column) in self.columns[joint].iter_mut().zip(columns) {
-            *sum += column;
-        }
-        self.values[joint] += value;
     }
 
     /// The mean row of a joint. `None` with too few rows.
