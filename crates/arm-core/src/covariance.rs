@@ -18,7 +18,7 @@ pub(crate) fn copy_triangle<T: Copy, const P: usize>(to: &mut [[T; P]; P], from:
 
 /// Goes through two rows of triangular matrices from a place on, or a little before it, where there are zeros.
 #[inline(always)]
-pub(crate) fn for_blocks<A, T: Copy, const P: usize>(
+fn for_blocks<A, T: Copy, const P: usize>(
     places: &mut [A; P],
     values: &[T; P],
     from: usize,

@@ -2,7 +2,6 @@
 
 use super::information::Row;
 use super::settings::Tuning;
-use crate::covariance::for_blocks;
 use crate::scalar::Real;
 
 /// Sums over a window of rows that the movement made meaningful.
@@ -38,12 +37,13 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
             return;
         }
         self.counts[joint] += 1;
-        let sums = &mut self.columns[joint];
+        let pairs = self.columns[joint].iter_mut().zip(columns);
         if self.counts[joint] == 1 {
-            for_blocks(sums, columns, 0, |sum, column| *sum = column);
+            // Added to nothing: the copying of memory in general takes longer.
+            pairs.for_each(|(sum, &column)| *sum = T::ZERO + column);
             self.values[joint] = value;
         } else {
-            for_blocks(sums, columns, 0, |sum, column| *sum += column);
+            pairs.for_each(|(sum, &column)| *sum += column);
             self.values[joint] += value;
         }
     }
