@@ -2,8 +2,9 @@
 
 use crate::scalar::{Real, Scalar};
 use crate::series::{
-    DOUBLE, LARGEST_REDUCED, LEAST_EXPONENT, SATURATED, SINGLE, exp_within, far_reduced_sin_cos,
-    reduced_sin_cos, tanh_within, turned, turned_single,
+    DOUBLE, LARGEST_ANGLES, LARGEST_REDUCED, LEAST_EXPONENT, SATURATED, SINGLE, exp_within,
+    far_reduced_sin_cos, far_reduced_sin_cos_single, reduced_sin_cos, tanh_within, turned,
+    turned_single,
 };
 
 /// Square roots of the processor where it has them: the compiler knows these two names, and takes its instruction or the
@@ -64,15 +65,18 @@ impl Real for f32 {
 #[cold]
 #[inline(never)]
 fn far_sin_cos(x: f64) -> (f64, f64) {
-    libm::sincos(x)
+    if x.abs() < LARGEST_ANGLES.0 {
+        turned(far_reduced_sin_cos(x))
+    } else {
+        (f64::NAN, f64::NAN)
+    }
 }
 
-/// Beyond 10⁸ neighbouring numbers are more than a turn apart: no angle, and NaN.
 #[cold]
 #[inline(never)]
 fn far_sin_cos_single(x: f32) -> (f32, f32) {
-    if x.abs() < 1e8 {
-        turned_single(far_reduced_sin_cos(x))
+    if x.abs() < LARGEST_ANGLES.1 {
+        turned_single(far_reduced_sin_cos_single(x))
     } else {
         (f32::NAN, f32::NAN)
     }

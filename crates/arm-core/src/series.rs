@@ -98,7 +98,7 @@ fn polynomials<T: Scalar, const S: usize, const C: usize>(
 
 /// As [`reduced_sin_cos`], for single precision from 2¹² to 2²⁷: with the quarter turns in integers of 64 bits, of which
 /// the upper two count the whole ones. No double precision, which small processors compute in software.
-pub(crate) fn far_reduced_sin_cos(x: f32) -> Reduced<f32> {
+pub(crate) fn far_reduced_sin_cos_single(x: f32) -> Reduced<f32> {
     /// 2/π times 2⁶⁴.
     const QUARTERS_PER_RADIAN: u64 = 0xa2f9_836e_4e44_152a;
     /// π/2 times 2³¹.
@@ -120,6 +120,24 @@ pub(crate) fn far_reduced_sin_cos(x: f32) -> Reduced<f32> {
     let sign = 1.0_f32.copysign(x);
     let whole = sign * nearest as u32 as f32;
     polynomials(SINGLE.round as f32 + whole, sign * r, &SINGLE)
+}
+
+/// The same in double precision, from 2¹⁶ to 2⁵³·2 rad: with the quarter turns in integers of 128 bits.
+pub(crate) fn far_reduced_sin_cos(x: f64) -> Reduced<f64> {
+    /// 2/π times 2¹²⁸.
+    const QUARTERS_PER_RADIAN: u128 = 0xa2f9_836e_4e44_1529_fc27_57d1_f534_ddc0;
+    let bits = x.abs().to_bits();
+    let mantissa = u128::from(bits & 0x000f_ffff_ffff_ffff | 0x0010_0000_0000_0000);
+    // |x| is the mantissa times 2^(exponent − 1075), and the quarters below are times 2¹²⁶.
+    let exponent = bits >> 52;
+    let quarters =
+        (QUARTERS_PER_RADIAN >> (1077_u64.wrapping_sub(exponent) & 127)).wrapping_mul(mantissa);
+    let nearest = quarters.wrapping_add(1 << 125) >> 126;
+    // The rest times 2⁶⁴, to radians.
+    let rest = (quarters.wrapping_sub(nearest << 126) as i128 >> 62) as i64;
+    let r = rest as f64 * (core::f64::consts::FRAC_PI_2 / 18_446_744_073_709_551_616.0);
+    let sign = 1.0_f64.copysign(x);
+    polynomials(ROUND + sign * nearest as u32 as f64, sign * r, &DOUBLE)
 }
 
 /// `c₀ + c₁z + c₂z² + …` by pairs, which wait for each other half as often as one by one.
@@ -176,6 +194,8 @@ pub(crate) fn turned_single(reduced: Reduced<f32>) -> (f32, f32) {
 
 /// Beyond this angle \[rad\] the short reduction would lose accuracy.
 pub(crate) const LARGEST_REDUCED: f64 = 1e5;
+/// Beyond these, in double and single precision, neighbouring numbers are more than a turn apart: no angle \[rad\].
+pub(crate) const LARGEST_ANGLES: (f64, f32) = (1e16, 1e8);
 
 /// 1.5·2⁵²: adding and subtracting it rounds to the nearest integer.
 const ROUND: f64 = DOUBLE.round;
