@@ -41,7 +41,6 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
     ///
     /// # Errors
     /// [`Invalid`] names the first value that is not finite, a length or mass that is not positive, or a negative inertia.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn new(
         segments: [Segment<T>; N],
         base: Plane<T>,
@@ -67,7 +66,6 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
     ///
     /// # Errors
     /// [`Invalid`] for an inertia that is negative or not finite.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn with_rotor_inertia(self, rotor: [T; N]) -> Result<Self, Invalid> {
         for (index, value) in rotor.iter().enumerate() {
             at_least_zero("rotor inertia of joint", index, *value)?;
@@ -100,7 +98,6 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
         )
     }
 
-    #[cfg_attr(target_os = "none", cold)]
     pub(crate) fn assembled(
         segments: [Segment<T>; N],
         base: Plane<T>,

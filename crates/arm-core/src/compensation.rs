@@ -34,7 +34,6 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
     /// # Errors
     /// [`Invalid`] for values that are not finite, and a covariance that is none: then its error is negative in some
     /// direction.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn new(
         equation: Equation<T, N, P, E>,
         values: [T; P],
@@ -76,7 +75,6 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
 }
 
 /// The root of a covariance, from the last unknown to the first.
-#[cfg_attr(target_os = "none", cold)]
 fn factorised<T: Real, const P: usize>(
     covariance: &[[T; P]; P],
 ) -> Result<Covariance<T, P>, Invalid> {

@@ -4,8 +4,7 @@
 //! and [`Lanes`] (many simulations side by side), and over the number of segments `N`. All transcendental functions
 //! come through [`Scalar`], so that a run has the same bits on every platform.
 //!
-//! On a device (`target_os = "none"`) what makes an arm, an estimator or a monitor is marked as cold, so that the compiler does
-//! not write it out where it is called, and sine, exponential and hyperbolic tangent stand once in the code. Neither changes a bit.
+//! On a device (`target_os = "none"`) sine, exponential and hyperbolic tangent stand once in the code. That changes no bit.
 //!
 //! Conventions: y forward, z up, counter-clockwise positive; `q[0]` from +y, the others relative to the segment before;
 //! SI units and radians; forces are named by what they act on. Inside, the dynamics are in link form: one row for each

@@ -211,7 +211,6 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     /// # Errors
     /// [`Invalid`] for no channel, a limit that is NaN, a range that is empty, a change that is not positive, and times of zero.
     /// An infinite limit is none.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn new(channels: [Channel<T>; C], times: Times) -> Result<Self, Invalid> {
         at_least_one("number of channels", C as u64)?;
         at_least_one("longest period", times.period)?;
@@ -236,7 +235,6 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     ///
     /// # Errors
     /// [`Invalid`] for no channel, and for more than there are.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn watching(self, count: usize) -> Result<Self, Invalid> {
         at_least_one("number of channels", count as u64)?;
         if count > C {

@@ -343,7 +343,6 @@ impl<T: Scalar> Effect<T> {
     ///
     /// # Errors
     /// [`Invalid`] names the first parameter that is outside.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn validate(&self, joints: usize) -> Result<(), Invalid> {
         let info = self.kind.info();
         let places = match info.place {

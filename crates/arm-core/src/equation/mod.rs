@@ -117,7 +117,6 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     ///
     /// # Errors
     /// [`Invalid`] for an effect that does not suit the arm, and for more unknowns than `P`.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn new(chain: Chain<T, N>, effects: [Effect<T>; E]) -> Result<Self, Invalid> {
         let mut used = 2 * N;
         let mut first = [0; E];
@@ -174,7 +173,6 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
 
     /// What the arm as given says of its unknowns: base parameters from masses, centres of mass and inertias that are
     /// each uncertain by a relative standard deviation, effects about their values and otherwise open.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn priors(&self, uncertainty: T) -> [Prior<T>; P] {
         let infinite = T::of(f64::INFINITY);
         let unused = Prior {

@@ -101,8 +101,6 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     /// # Errors
     /// [`Invalid`] for settings that are out of range, and priors without a positive standard deviation or with an empty
     /// range.
-    // On a device in its place: what it returns is too large to stand on the stack twice.
-    #[cfg_attr(target_os = "none", inline(always))]
     pub fn new(
         equation: Equation<T, N, P, E>,
         priors: [Prior<T>; P],

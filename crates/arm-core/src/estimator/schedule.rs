@@ -59,7 +59,6 @@ pub(super) const fn split(unknowns: usize) -> usize {
 
 /// What a period may spend so that all work on a window, were two unknowns of three fixed to a bound, is done in `free` periods;
 /// at least the largest of the usual units. Were it more, the values would be published with the next window.
-#[cfg_attr(target_os = "none", cold)]
 pub(super) fn budget(size: [usize; 2], free: u32) -> usize {
     let mut budget = [
         Work::Row(0),

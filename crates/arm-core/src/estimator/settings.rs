@@ -61,7 +61,6 @@ impl<T: Real, const N: usize> Settings<T, N> {
     /// Settings for an arm and a control period \[s\]: movements to 3 Hz, 0.1 N m of noise, nothing forgotten; joints within
     /// half a turn to either side and below 20 rad/s, loads below ten times the arm's weight, a support that differs from the
     /// expected one by at most half of a joint's largest weight torque.
-    #[cfg_attr(target_os = "none", cold)]
     pub fn new(chain: &Chain<T, N>, period: T) -> Self {
         let infinite = T::of(f64::INFINITY);
         let [y, z] = chain.gravity();
@@ -149,7 +148,6 @@ const FEWEST_ROWS: u32 = 20;
 
 impl<T: Real, const N: usize> Tuning<T, N> {
     /// * `unknowns` - how many there are: they make the work that is spread over a window
-    #[cfg_attr(target_os = "none", cold)]
     pub fn new(s: &Settings<T, N>, unknowns: usize) -> Result<Self, Invalid> {
         let (period, cutoff, window) = (s.period, s.cutoff, s.window);
         positive("control period", 0, s.period)?;
@@ -264,7 +262,6 @@ fn positive_or_infinite<T: Real>(
     }
 }
 
-#[cfg_attr(target_os = "none", cold)]
 fn in_range<T: Real>(name: &'static str, found: T, min: f64, max: f64) -> Result<(), Invalid> {
     if found.within(min, max) {
         return Ok(());
