@@ -3,12 +3,9 @@
 use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
 
-use arm_core::effect::{
-    ActsOn, Effect, KINDS, MAX_STATES, Motion, States, applied, resisting_torque,
-};
+use arm_core::effect::{ActsOn, Effect, KINDS, MAX_STATES, States, applied};
 use arm_core::{
-    Chain, Equation, Load, Pose, Segment, forward_dynamics, gravity, inverse_dynamics, jacobian,
-    joint_force, static_torque, tip,
+    Chain, Equation, Load, Measured, Pose, Segment, forward_dynamics, gravity, jacobian, tip,
 };
 
 use crate::held::{Held, held};
@@ -381,26 +378,12 @@ pub unsafe extern "C" fn armrs_resistance(
             .copied()
             .unwrap_or_default();
         let seen = motion.core()?;
-        let found = resistance(arm.inner()?, &Pose::new(&seen.q), &seen, force);
+        let (kept, pose) = (arm.inner()?, Pose::new(&seen.q));
+        let found = kept.equation.resisting(&pose, &seen, &kept.memory, force);
         *torque = finite(array(&found))?;
         Ok(())
     };
     ended(run())
-}
-
-fn resistance(
-    arm: &Kept,
-    pose: &Pose<armrs_real, ARMRS_JOINTS>,
-    seen: &Motion<armrs_real, ARMRS_JOINTS>,
-    force: [armrs_real; 2],
-) -> arm_core::Joints<armrs_real, ARMRS_JOINTS> {
-    let chain = arm.equation.chain();
-    let effects = arm.equation.effects();
-    if !arm.equation.feels_force() {
-        return resisting_torque(effects, seen, &arm.memory);
-    }
-    let bearing = joint_force(chain, pose, (&seen.qd, &seen.qdd), force);
-    resisting_torque(effects, &seen.with_joint_force(&bearing), &arm.memory)
 }
 
 /// Torques that motors would need for a motion under a load [N m]: inertia, gravity and effects, less what the load's force
@@ -421,14 +404,13 @@ pub unsafe extern "C" fn armrs_inverse_dynamics(
         let (arm, motion) = unsafe { (given(arm)?.inner()?, given(motion)?) };
         // SAFETY: as promised by the caller.
         let (load, torque) = unsafe { (given(load)?, places::<ARMRS_JOINTS>(torque)?) };
-        let (chain, seen) = (arm.equation.chain(), motion.core()?);
-        let pose = Pose::new(&seen.q);
-        let moving = inverse_dynamics(chain, &pose, &seen.qd, &seen.qdd);
-        let resisting = resistance(arm, &pose, &seen, load.force_on_arm);
-        let pushed = static_torque(chain, &pose, load.force_on_arm, load.moment_on_arm);
-        *torque = finite(core::array::from_fn(|j| {
-            moving[j] + resisting[j] - pushed[j]
-        }))?;
+        let load = Measured {
+            torque: joints(&[0.0; ARMRS_JOINTS]),
+            force_on_arm: load.force_on_arm,
+            moment_on_arm: load.moment_on_arm,
+        };
+        let found = arm.equation.demanded(&motion.core()?, &arm.memory, &load);
+        *torque = finite(array(&found))?;
         Ok(())
     };
     ended(run())
@@ -453,13 +435,14 @@ pub unsafe extern "C" fn armrs_forward_dynamics(
         let (load, acceleration) = unsafe { (given(load)?, places(acceleration)?) };
         let seen = motion.still().core()?;
         let pose = Pose::new(&seen.q);
-        let resisting = resistance(arm, &pose, &seen, load.force_on_arm);
+        let (equation, force) = (&arm.equation, load.force_on_arm);
+        let resisting = equation.resisting(&pose, &seen, &arm.memory, force);
         let net = Load {
             torque: joints(&core::array::from_fn(|j| load.torque[j] - resisting[j])),
-            force_on_arm: load.force_on_arm,
+            force_on_arm: force,
             moment_on_arm: load.moment_on_arm,
         };
-        let found = forward_dynamics(arm.equation.chain(), &pose, &seen.qd, &net);
+        let found = forward_dynamics(equation.chain(), &pose, &seen.qd, &net);
         *acceleration = finite(array(&found))?;
         Ok(())
     };

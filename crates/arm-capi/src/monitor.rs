@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason, Times};
+use arm_core::monitor::{Channel, Monitor, Quantity, Reason, Times};
 
 use crate::held::{Held, held};
 use crate::status::{
@@ -188,13 +188,12 @@ pub unsafe extern "C" fn armrs_monitor_check(
         // SAFETY: as promised by the caller.
         let (monitor, seen, stop) =
             unsafe { (place(monitor)?, given(observation)?, stop.as_mut()) };
-        let seen = Observation {
-            now: seen.now,
-            stamp: seen.stamp,
-            values: seen.values,
-            moving: seen.moving.map(|m| m != 0),
-        };
-        let Err(found) = monitor.inner_mut()?.check(&seen) else {
+        let moving = |channel: usize| seen.moving.get(channel).is_some_and(|&m| m != 0);
+        let times = [seen.now, seen.stamp];
+        let Err(found) = monitor
+            .inner_mut()?
+            .check_values(times, &seen.values, moving)
+        else {
             return Ok(());
         };
         if let Some(stop) = stop {

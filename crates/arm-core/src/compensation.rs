@@ -1,12 +1,10 @@
 //! The torque that carries an arm: its weight and its passive moments, and what that torque may be wrong by.
 
-use core::array::from_fn;
-
 use crate::covariance::Covariance;
 use crate::effect::{Motion, States};
-use crate::equation::{Equation, Needed};
+use crate::equation::Equation;
 use crate::scalar::Real;
-use crate::{Invalid, Joints, check, joints};
+use crate::{Invalid, Joints, check};
 
 /// Torques and what they may be wrong by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,12 +62,14 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
         motion: &Motion<T, N>,
         memory: &[States<T>; E],
     ) -> GravityCompensation<T, N> {
-        let mut rows = Needed::none();
-        self.equation.add_carrying(motion, memory, &mut rows);
+        let values = |i: usize| [self.values.get(i).copied().unwrap_or(T::ZERO); 2];
+        let ([torque, _], sd) = self
+            .equation
+            .carried(motion, memory, values, &self.covariance);
         GravityCompensation {
             within: true,
-            torque: rows.torque(&self.values),
-            sd: joints(from_fn(|j| self.covariance.deviation(&rows.columns[j]))),
+            torque,
+            sd,
         }
     }
 }
@@ -78,27 +78,24 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Compensation<T, N,
 fn factorised<T: Real, const P: usize>(
     covariance: &[[T; P]; P],
 ) -> Result<Covariance<T, P>, Invalid> {
-    let Covariance {
-        mut rows,
-        mut variances,
-    } = Covariance::independent([T::ZERO; P]);
+    let Covariance { mut root } = Covariance::independent([T::ZERO; P]);
     for k in (0..P).rev() {
         for i in (0..P).rev().filter(|&i| i <= k) {
             let mut value = covariance[k][i];
             for m in k + 1..P {
-                value -= rows[i][m] * rows[k][m] * variances[m];
+                value -= root[i][m] * root[k][m];
             }
             if i == k {
                 // Rounding may leave a little less than nothing of a variance that others explain.
                 let rounding = covariance[k][k] * T::of(ROUNDING);
                 check::at_least_zero("variance of unknown", k, value + rounding)?;
-                variances[k] = value.max(T::ZERO);
-            } else if variances[k] > T::ZERO {
-                rows[i][k] = value / variances[k];
+                root[k][k] = value.max(T::ZERO).sqrt();
+            } else if root[k][k] > T::ZERO {
+                root[i][k] = value / root[k][k];
             }
         }
     }
-    Ok(Covariance { rows, variances })
+    Ok(Covariance { root })
 }
 
 /// Share of a variance that may be lost to rounding.

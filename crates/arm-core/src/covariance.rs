@@ -1,42 +1,101 @@
 //! A covariance by its root.
 
+use core::array::from_fn;
+
 use crate::scalar::Real;
 
-/// `A V Aᵀ` with a diagonal `V`.
+/// Columns that a loop over a triangular matrix takes at once: what is written out costs a third less than one by one.
+const BLOCK: usize = 6;
+
+/// Copies a triangular matrix.
+// Not by rows: the copying of memory in general takes longer.
+#[inline(never)]
+pub(crate) fn copy_triangle<T: Copy, const P: usize>(to: &mut [[T; P]; P], from: &[[T; P]; P]) {
+    for (i, (to, from)) in to.iter_mut().zip(from).enumerate() {
+        for_blocks(to, from, i, |place, value| *place = value);
+    }
+}
+
+/// Goes through two rows of triangular matrices from a place on, or a little before it, where there are zeros.
+#[inline(always)]
+fn for_blocks<A, T: Copy, const P: usize>(
+    places: &mut [A; P],
+    values: &[T; P],
+    from: usize,
+    act: impl Fn(&mut A, T),
+) {
+    let (blocks, last) = places.as_chunks_mut::<BLOCK>();
+    let (others, rest) = values.as_chunks::<BLOCK>();
+    let blocks = blocks.get_mut(from / BLOCK..).unwrap_or_default();
+    let others = others.get(from / BLOCK..).unwrap_or_default();
+    for (block, other) in blocks.iter_mut().zip(others) {
+        for (place, &value) in block.iter_mut().zip(other) {
+            act(place, value);
+        }
+    }
+    for (place, &value) in last.iter_mut().zip(rest) {
+        act(place, value);
+    }
+}
+
+/// `A Aᵀ` with an upper triangular `A`.
 ///
 /// With a root no rounding makes a variance negative, and where many parts cancel, half as many digits are lost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Covariance<T, const P: usize> {
-    /// `A`: how each unknown depends on independent quantities.
-    pub rows: [[T; P]; P],
-    /// `V`: the variances of these.
-    pub variances: [T; P],
+    /// `A`: how each unknown depends on independent quantities of variance one, its own and those of the unknowns after it.
+    pub root: [[T; P]; P],
 }
 
 impl<T: Real, const P: usize> Covariance<T, P> {
-    /// That of independent unknowns.
-    pub fn independent(variances: [T; P]) -> Self {
-        let mut rows = [[T::ZERO; P]; P];
-        for (k, row) in rows.iter_mut().enumerate() {
-            row[k] = T::ONE;
+    /// That of independent unknowns, from their standard deviations.
+    pub fn independent(sd: [T; P]) -> Self {
+        let mut root = [[T::ZERO; P]; P];
+        for (k, row) in root.iter_mut().enumerate() {
+            row[k] = sd[k];
         }
-        Self { rows, variances }
+        Self { root }
     }
 
-    /// Standard deviation of a weighted sum of the unknowns. Those without a weight cost nothing.
+    /// Sums of the leading unknowns with weights, each from one of them on, given in the independent quantities.
+    #[inline]
+    pub fn tails<const N: usize>(&self, weights: &[T; N]) -> Sums<T, N, P> {
+        Sums(from_fn(|i| {
+            let (mut sum, mut all) = (T::ZERO, [T::ZERO; N]);
+            let rows = self.root.iter().zip(weights).zip(&mut all);
+            for ((row, &weight), place) in rows.rev() {
+                sum += weight * row[i];
+                *place = sum;
+            }
+            all
+        }))
+    }
+}
+
+/// `N` sums of unknowns, in the independent quantities.
+pub(crate) struct Sums<T, const N: usize, const P: usize>([[T; N]; P]);
+
+impl<T: Real, const N: usize, const P: usize> Sums<T, N, P> {
+    /// Adds an unknown with a weight to one of them.
     #[inline(never)]
-    pub fn deviation(&self, weights: &[T; P]) -> T {
-        let mut sums = [T::ZERO; P];
-        for (&weight, row) in weights.iter().zip(&self.rows) {
-            if weight != T::ZERO {
-                for (sum, &value) in sums.iter_mut().zip(row) {
-                    *sum += weight * value;
-                }
+    pub fn add(&mut self, number: usize, covariance: &Covariance<T, P>, unknown: usize, weight: T) {
+        let Some(row) = covariance.root.get(unknown).filter(|_| number < N) else {
+            return;
+        };
+        for_blocks(&mut self.0, row, unknown, |places, value| {
+            places[number] += weight * value
+        });
+    }
+
+    /// Their standard deviations.
+    #[inline]
+    pub fn deviations(&self) -> [T; N] {
+        let mut variances = [T::ZERO; N];
+        for values in &self.0 {
+            for (variance, value) in variances.iter_mut().zip(values) {
+                *variance += value.squared();
             }
         }
-        let squares = sums.iter().zip(&self.variances);
-        squares
-            .fold(T::ZERO, |all, (&sum, &v)| all + sum.squared() * v)
-            .sqrt()
+        variances.map(T::sqrt)
     }
 }

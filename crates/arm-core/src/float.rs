@@ -2,8 +2,9 @@
 
 use crate::scalar::{Real, Scalar};
 use crate::series::{
-    DOUBLE, LARGEST_REDUCED, SATURATED, SINGLE, exp, far_reduced_sin_cos, reduced_sin_cos, tanh,
-    turned, turned_single,
+    DOUBLE, LARGEST_ANGLES, LARGEST_REDUCED, LEAST_EXPONENT, SATURATED, SINGLE, exp_within,
+    far_reduced_sin_cos, far_reduced_sin_cos_single, reduced_sin_cos, tanh_within, turned,
+    turned_single,
 };
 
 /// Square roots of the processor where it has them: the compiler knows these two names, and takes its instruction or the
@@ -64,15 +65,18 @@ impl Real for f32 {
 #[cold]
 #[inline(never)]
 fn far_sin_cos(x: f64) -> (f64, f64) {
-    libm::sincos(x)
+    if x.abs() < LARGEST_ANGLES.0 {
+        turned(far_reduced_sin_cos(x))
+    } else {
+        (f64::NAN, f64::NAN)
+    }
 }
 
-/// Beyond 10⁸ neighbouring numbers are more than a turn apart: no angle, and NaN.
 #[cold]
 #[inline(never)]
 fn far_sin_cos_single(x: f32) -> (f32, f32) {
-    if x.abs() < 1e8 {
-        turned_single(far_reduced_sin_cos(x))
+    if x.abs() < LARGEST_ANGLES.1 {
+        turned_single(far_reduced_sin_cos_single(x))
     } else {
         (f32::NAN, f32::NAN)
     }
@@ -86,8 +90,21 @@ impl Scalar for f64 {
         value
     }
     #[inline]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline]
     fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
         if a < b { then } else { otherwise }
+    }
+    #[inline]
+    fn where_less(
+        a: Self,
+        b: Self,
+        then: impl FnOnce() -> Self,
+        otherwise: impl FnOnce() -> Self,
+    ) -> Self {
+        if a < b { then() } else { otherwise() }
     }
     #[inline]
     fn every(self, condition: impl Fn(f64) -> bool) -> bool {
@@ -105,7 +122,9 @@ impl Scalar for f64 {
     fn sqrt(self) -> Self {
         root::sqrt(self)
     }
-    #[inline]
+    // On a device once in the code.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline)]
     fn sin_cos(self) -> (Self, Self) {
         if self.abs() <= LARGEST_REDUCED {
             turned(reduced_sin_cos(self, &DOUBLE))
@@ -113,7 +132,8 @@ impl Scalar for f64 {
             far_sin_cos(self)
         }
     }
-    /// In one pass without a branch, which the compiler makes for several at once.
+    /// In one pass without a branch, which the compiler makes for several at once where it can.
+    #[cfg(not(target_os = "none"))]
     #[inline(always)]
     fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
         let [mut sines, mut cosines] = [[0.0; K]; 2];
@@ -131,15 +151,24 @@ impl Scalar for f64 {
     }
     #[inline]
     fn exp(self) -> Self {
-        exp(self)
+        if self < LEAST_EXPONENT {
+            0.0
+        } else {
+            exp_within(self)
+        }
     }
     #[inline]
     fn tanh(self) -> Self {
-        // The usual case of dry friction; the polynomial gives the same bits.
-        if self.abs() > SATURATED {
-            return f64::copysign(1.0, self);
-        }
-        tanh(self)
+        let size = f64::abs(self);
+        // The usual cases of dry friction, motion and rest; the polynomial gives the same bits.
+        let value = if size > SATURATED {
+            1.0
+        } else if size == 0.0 {
+            0.0
+        } else {
+            tanh_within(size)
+        };
+        value.copysign(self)
     }
     #[inline]
     fn atan2(self, x: Self) -> Self {
@@ -155,8 +184,21 @@ impl Scalar for f32 {
         value as f32
     }
     #[inline]
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
+    #[inline]
     fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
         if a < b { then } else { otherwise }
+    }
+    #[inline]
+    fn where_less(
+        a: Self,
+        b: Self,
+        then: impl FnOnce() -> Self,
+        otherwise: impl FnOnce() -> Self,
+    ) -> Self {
+        if a < b { then() } else { otherwise() }
     }
     #[inline]
     fn every(self, condition: impl Fn(f64) -> bool) -> bool {
@@ -183,7 +225,9 @@ impl Scalar for f32 {
     fn sqrt(self) -> Self {
         root::sqrtf(self)
     }
-    #[inline]
+    // On a device once in the code.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline)]
     fn sin_cos(self) -> (Self, Self) {
         // 3-part reduction in single precision holds to a few thousand radians.
         if self.abs() <= 4096.0 {

@@ -17,8 +17,9 @@ pub struct Pose<T, const N: usize> {
 
 impl<T: Scalar, const N: usize> Pose<T, N> {
     /// The pose at joint angles `q` \[rad\].
-    // Always, so that a loop which is compiled for wider vectors takes it along.
-    #[inline(always)]
+    // Always, so that a loop which is compiled for wider vectors takes it along; on a device once in the code.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn new(q: &Joints<T, N>) -> Self {
         let [sin, cos] = T::sines_and_cosines(&to_links(q));
         Self { sin, cos }

@@ -71,6 +71,10 @@ impl<const L: usize> Scalar for Lanes<L> {
         }))
     }
     #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+    #[inline(always)]
     fn every(self, condition: impl Fn(f64) -> bool) -> bool {
         self.0.iter().all(|&a| condition(a))
     }

@@ -4,6 +4,8 @@
 //! and [`Lanes`] (many simulations side by side), and over the number of segments `N`. All transcendental functions
 //! come through [`Scalar`], so that a run has the same bits on every platform.
 //!
+//! On a device (`target_os = "none"`) sine, exponential and hyperbolic tangent stand once in the code. That changes no bit.
+//!
 //! Conventions: y forward, z up, counter-clockwise positive; `q[0]` from +y, the others relative to the segment before;
 //! SI units and radians; forces are named by what they act on. Inside, the dynamics are in link form: one row for each
 //! link in absolute angles, which needs few operations and separates the base parameters.

@@ -260,8 +260,28 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     /// The first [`Stop`], in every period from then on.
     #[inline]
     pub fn check(&mut self, seen: &Observation<T, C>) -> Result<(), Stop<T>> {
+        let times = [seen.now, seen.stamp];
+        self.check_values(times, &seen.values, |channel| {
+            seen.moving.get(channel) == Some(&true)
+        })
+    }
+
+    /// [`Monitor::check`] of values that stand elsewhere, which need not be copied.
+    ///
+    /// * `times` - the controller's clock, and when the values were measured \[µs\]
+    /// * `moving` - whether motion is commanded that must change a channel
+    ///
+    /// # Errors
+    /// As of [`Monitor::check`].
+    #[inline]
+    pub fn check_values(
+        &mut self,
+        times: [u64; 2],
+        values: &[T; C],
+        moving: impl Fn(usize) -> bool,
+    ) -> Result<(), Stop<T>> {
         if self.stop.is_none() {
-            self.stop = self.fault(seen);
+            self.stop = self.fault(times, values, moving);
         }
         self.stop.map_or(Ok(()), Err)
     }
@@ -282,18 +302,23 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         &self.channels
     }
 
-    fn fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
-        let memory = self.memory_fault(seen);
+    fn fault(
+        &mut self,
+        times: [u64; 2],
+        values: &[T; C],
+        moving: impl Fn(usize) -> bool,
+    ) -> Option<Stop<T>> {
+        let memory = self.memory_fault(times[0]);
         if memory.is_some() {
             return memory;
         }
-        let clock = self.clock_fault(seen);
-        let value = self.value_fault(seen);
+        let clock = self.clock_fault(times);
+        let value = self.value_fault(times, values, moving);
         clock.or(value)
     }
 
     /// A limit that is not what it was. One channel in each period.
-    fn memory_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+    fn memory_fault(&mut self, now: u64) -> Option<Stop<T>> {
         let index = self.next;
         self.next = if index + 1 < self.watched {
             index + 1
@@ -307,76 +332,75 @@ impl<T: Real, const C: usize> Monitor<T, C> {
             channel: Some(index),
             value: T::ZERO,
             limit: T::ZERO,
-            at: seen.now,
+            at: now,
         })
     }
 
-    fn clock_fault(&self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+    fn clock_fault(&self, [now, stamp]: [u64; 2]) -> Option<Stop<T>> {
         let stop = |reason, age: T| Stop {
             reason,
             channel: None,
             value: age,
             limit: seconds(self.times.oldest),
-            at: seen.now,
+            at: now,
         };
-        if seen.stamp > seen.now {
-            return Some(stop(Reason::Clock, -seconds::<T>(seen.stamp - seen.now)));
+        if stamp > now {
+            return Some(stop(Reason::Clock, -seconds::<T>(stamp - now)));
         }
-        let age = seen.now - seen.stamp;
+        let age = now - stamp;
         if let Some(last) = &self.last
-            && (seen.now < last.now || seen.stamp < last.stamp)
+            && (now < last.now || stamp < last.stamp)
         {
             return Some(stop(Reason::Clock, seconds(age)));
         }
         if let Some(last) = &self.last
-            && seen.now - last.now > self.times.period
+            && now - last.now > self.times.period
         {
             return Some(Stop {
                 limit: seconds(self.times.period),
-                ..stop(Reason::Stalled, seconds(seen.now - last.now))
+                ..stop(Reason::Stalled, seconds(now - last.now))
             });
         }
         (age > self.times.oldest).then(|| stop(Reason::Late, seconds(age)))
     }
 
     /// Remembers the observation and finds the first channel that is not as allowed. Repeats of one sample count as one.
-    fn value_fault(&mut self, seen: &Observation<T, C>) -> Option<Stop<T>> {
+    fn value_fault(
+        &mut self,
+        [now, stamp]: [u64; 2],
+        values: &[T; C],
+        moving: impl Fn(usize) -> bool,
+    ) -> Option<Stop<T>> {
         let first = self.last.is_none();
         let last = self.last.get_or_insert(Seen {
-            now: seen.now,
-            stamp: seen.stamp,
-            values: seen.values,
-            unchanged: [seen.stamp; C],
+            now,
+            stamp,
+            values: *values,
+            unchanged: [stamp; C],
         });
         // Between samples, not between checks: the same sample twice is no change.
-        let passed: T = seconds(seen.stamp.saturating_sub(last.stamp));
-        (last.now, last.stamp) = (seen.now, seen.stamp);
+        let passed: T = seconds(stamp.saturating_sub(last.stamp));
+        (last.now, last.stamp) = (now, stamp);
         let mut found = None;
         for index in 0..self.watched.min(C) {
-            let (channel, value) = (&self.channels[index], seen.values[index]);
-            let moved = (value - last.values[index]).abs();
+            let (channel, value) = (&self.channels[index], values[index]);
             let before = last.values[index];
             last.values[index] = value;
-            let fault = if !value.is_finite() {
-                Some((Reason::NotFinite, value, channel.min))
-            } else if value > channel.max {
-                Some((Reason::Limit, value, channel.max))
-            } else if value < channel.min {
-                Some((Reason::Limit, value, channel.min))
-            } else if moved > channel.farthest {
-                Some((Reason::Jump, moved, channel.farthest))
-            } else if moved > channel.fastest * passed && moved > T::ZERO {
-                Some((Reason::Jump, moved / passed, channel.fastest))
-            } else if let Some(limit) = channel.frozen_after {
-                let same = !first && seen.moving[index] && value == before;
+            let moved = (value - before).abs();
+            let mut fault = None;
+            if channel.refuses(value, moved, passed) {
+                fault = channel.fault(value, moved, passed);
+            }
+            if let Some(limit) = channel.frozen_after
+                && fault.is_none()
+            {
+                let same = !first && value == before && moving(index);
                 if !same {
-                    last.unchanged[index] = seen.stamp;
+                    last.unchanged[index] = stamp;
                 }
-                let time = seen.stamp.saturating_sub(last.unchanged[index]);
-                (time > limit).then(|| (Reason::Frozen, seconds(time), seconds(limit)))
-            } else {
-                None
-            };
+                let time = stamp.saturating_sub(last.unchanged[index]);
+                fault = (time > limit).then(|| (Reason::Frozen, seconds(time), seconds(limit)));
+            }
             if let Some((reason, value, limit)) = fault
                 && found.is_none()
             {
@@ -385,11 +409,43 @@ impl<T: Real, const C: usize> Monitor<T, C> {
                     channel: Some(index),
                     value,
                     limit,
-                    at: seen.now,
+                    at: now,
                 });
             }
         }
         found
+    }
+}
+
+impl<T: Real> Channel<T> {
+    /// Whether a value is not allowed, or may not be. One that is not finite has moved by no finite amount.
+    #[inline]
+    fn refuses(&self, value: T, moved: T, passed: T) -> bool {
+        !(value <= self.max
+            && value >= self.min
+            && moved < T::of(f64::INFINITY)
+            && moved <= self.farthest
+            && moved <= self.fastest * passed)
+    }
+
+    /// What is wrong with a value: why, what was found, and the limit.
+    #[cold]
+    #[inline(never)]
+    fn fault(&self, value: T, moved: T, passed: T) -> Option<(Reason, T, T)> {
+        if !value.is_finite() {
+            Some((Reason::NotFinite, value, self.min))
+        } else if value > self.max {
+            Some((Reason::Limit, value, self.max))
+        } else if value < self.min {
+            Some((Reason::Limit, value, self.min))
+        } else if moved > self.farthest {
+            Some((Reason::Jump, moved, self.farthest))
+        } else if moved > self.fastest * passed && moved > T::ZERO {
+            Some((Reason::Jump, moved / passed, self.fastest))
+        } else {
+            // An infinite speed in no time is none.
+            None
+        }
     }
 }
 

@@ -98,7 +98,7 @@ fn polynomials<T: Scalar, const S: usize, const C: usize>(
 
 /// As [`reduced_sin_cos`], for single precision from 2¹² to 2²⁷: with the quarter turns in integers of 64 bits, of which
 /// the upper two count the whole ones. No double precision, which small processors compute in software.
-pub(crate) fn far_reduced_sin_cos(x: f32) -> Reduced<f32> {
+pub(crate) fn far_reduced_sin_cos_single(x: f32) -> Reduced<f32> {
     /// 2/π times 2⁶⁴.
     const QUARTERS_PER_RADIAN: u64 = 0xa2f9_836e_4e44_152a;
     /// π/2 times 2³¹.
@@ -122,6 +122,24 @@ pub(crate) fn far_reduced_sin_cos(x: f32) -> Reduced<f32> {
     polynomials(SINGLE.round as f32 + whole, sign * r, &SINGLE)
 }
 
+/// The same in double precision, from 2¹⁶ to 2⁵³·2 rad: with the quarter turns in integers of 128 bits.
+pub(crate) fn far_reduced_sin_cos(x: f64) -> Reduced<f64> {
+    /// 2/π times 2¹²⁸.
+    const QUARTERS_PER_RADIAN: u128 = 0xa2f9_836e_4e44_1529_fc27_57d1_f534_ddc0;
+    let bits = x.abs().to_bits();
+    let mantissa = u128::from(bits & 0x000f_ffff_ffff_ffff | 0x0010_0000_0000_0000);
+    // |x| is the mantissa times 2^(exponent − 1075), and the quarters below are times 2¹²⁶.
+    let exponent = bits >> 52;
+    let quarters =
+        (QUARTERS_PER_RADIAN >> (1077_u64.wrapping_sub(exponent) & 127)).wrapping_mul(mantissa);
+    let nearest = quarters.wrapping_add(1 << 125) >> 126;
+    // The rest times 2⁶⁴, to radians.
+    let rest = (quarters.wrapping_sub(nearest << 126) as i128 >> 62) as i64;
+    let r = rest as f64 * (core::f64::consts::FRAC_PI_2 / 18_446_744_073_709_551_616.0);
+    let sign = 1.0_f64.copysign(x);
+    polynomials(ROUND + sign * nearest as u32 as f64, sign * r, &DOUBLE)
+}
+
 /// `c₀ + c₁z + c₂z² + …` by pairs, which wait for each other half as often as one by one.
 #[inline]
 fn series<T: Scalar>(c: &[f64], z: T) -> T {
@@ -139,6 +157,21 @@ fn series<T: Scalar>(c: &[f64], z: T) -> T {
 #[inline]
 pub(crate) fn turned(reduced: Reduced<f64>) -> (f64, f64) {
     let n = reduced.quarters.to_bits();
+    // The same where a number takes two registers, and its bits more instructions than its value.
+    if cfg!(target_pointer_width = "32") {
+        let n = n as u32;
+        let (sin, cos) = match n & 1 {
+            0 => (reduced.sin, reduced.cos),
+            _ => (reduced.cos, reduced.sin),
+        };
+        let sin = if n & 2 == 0 { sin } else { -sin };
+        let cos = if n.wrapping_add(1) & 2 == 0 {
+            cos
+        } else {
+            -cos
+        };
+        return (sin, cos);
+    }
     let (sin, cos) = (reduced.sin.to_bits(), reduced.cos.to_bits());
     let exchange = (sin ^ cos) & (n & 1).wrapping_neg();
     (
@@ -161,6 +194,8 @@ pub(crate) fn turned_single(reduced: Reduced<f32>) -> (f32, f32) {
 
 /// Beyond this angle \[rad\] the short reduction would lose accuracy.
 pub(crate) const LARGEST_REDUCED: f64 = 1e5;
+/// Beyond these, in double and single precision, neighbouring numbers are more than a turn apart: no angle \[rad\].
+pub(crate) const LARGEST_ANGLES: (f64, f32) = (1e16, 1e8);
 
 /// 1.5·2⁵²: adding and subtracting it rounds to the nearest integer.
 const ROUND: f64 = DOUBLE.round;
@@ -194,20 +229,40 @@ fn power_and_rest(x: f64) -> [f64; 2] {
     [f64::from_bits(exponent), rest]
 }
 
-/// Exponential; zero below −708, where it would not be a normal number.
+/// Below this the exponential would not be a normal number, and is zero.
+pub(crate) const LEAST_EXPONENT: f64 = -708.0;
+/// Beyond this the exponential is infinite.
+pub(crate) const LARGEST_EXPONENT: f64 = 710.0;
+
+/// Exponential; zero below −708.
 #[inline]
 pub(crate) fn exp(x: f64) -> f64 {
-    let inside = if x < -708.0 { -708.0 } else { x };
-    let inside = if inside > 710.0 { 710.0 } else { inside };
+    let inside = if x < LEAST_EXPONENT {
+        LEAST_EXPONENT
+    } else {
+        x
+    };
+    let value = exp_within(inside);
+    if x < LEAST_EXPONENT { 0.0 } else { value }
+}
+
+/// Exponential from −708 on.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline)]
+pub(crate) fn exp_within(x: f64) -> f64 {
+    let inside = if x > LARGEST_EXPONENT {
+        LARGEST_EXPONENT
+    } else {
+        x
+    };
     let [half, rest] = power_and_rest(inside);
-    let value = 2.0 * (half + half * rest);
-    if x < -708.0 { 0.0 } else { value }
+    2.0 * (half + half * rest)
 }
 
 /// Beyond this the hyperbolic tangent is 1 in double precision.
 pub(crate) const SATURATED: f64 = 20.0;
 
-/// Hyperbolic tangent, `(e²ˣ − 1)/(e²ˣ + 1)`.
+/// Hyperbolic tangent.
 #[inline]
 pub(crate) fn tanh(x: f64) -> f64 {
     let size = if x.abs() > SATURATED {
@@ -215,8 +270,15 @@ pub(crate) fn tanh(x: f64) -> f64 {
     } else {
         x.abs()
     };
-    let [half, rest] = power_and_rest(2.0 * size);
+    tanh_within(size).copysign(x)
+}
+
+/// Hyperbolic tangent from zero to its saturation, `(e²ˣ − 1)/(e²ˣ + 1)`.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline)]
+pub(crate) fn tanh_within(x: f64) -> f64 {
+    let [half, rest] = power_and_rest(2.0 * x);
     let power = 2.0 * half;
     let grown = power * rest + (power - 1.0);
-    (grown / (grown + 2.0)).copysign(x)
+    grown / (grown + 2.0)
 }

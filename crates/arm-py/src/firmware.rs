@@ -1,9 +1,7 @@
 //! What `armrs export-c` needs of the core: the unknowns of a model, its calibration, and torques as the C interface gives them.
 
-use arm_core::effect::{ActsOn, Effect, Kind, MAX_STATES, Motion, applied, resisting_torque};
-use arm_core::{
-    Calibration, Chain, Equation, Invalid, Pose, Real, inverse_dynamics, joint_force, static_torque,
-};
+use arm_core::effect::{ActsOn, Effect, Kind, MAX_STATES, Motion, applied};
+use arm_core::{Calibration, Chain, Equation, Invalid, Measured, Real};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -152,25 +150,19 @@ fn off<T: Real>() -> Effect<T> {
     }
 }
 
-/// Inverse dynamics in the order of operations of `armrs_inverse_dynamics`.
+/// What `armrs_inverse_dynamics` gives.
 fn torque<const N: usize>(equation: &DeviceEquation<f64, N>, sample: &[f64]) -> Vec<f64> {
     let at = |k: usize| joints::<f64, N>(&sample[k * N..(k + 1) * N]);
-    let (q, qd, qdd) = (at(0), at(1), at(2));
-    let [y, z, moment] = [0, 1, 2].map(|k| sample[3 * N + k]);
-    let (chain, pose) = (equation.chain(), Pose::new(&q));
-    let mut motion = Motion::new(0.0, q, qd);
-    motion.qdd = qdd;
-    let bearing = joint_force(chain, &pose, (&qd, &qdd), [y, z]);
-    let resisting = resisting_torque(
-        equation.effects(),
-        &motion.with_joint_force(&bearing),
-        &[[0.0; MAX_STATES]; EFFECTS],
-    );
-    let moving = inverse_dynamics(chain, &pose, &qd, &qdd);
-    let pushed = static_torque(chain, &pose, [y, z], moment);
-    (0..N)
-        .map(|j| moving[j] + resisting[j] - pushed[j])
-        .collect()
+    let mut motion = Motion::new(0.0, at(0), at(1));
+    motion.qdd = at(2);
+    let [y, z, moment_on_arm] = [0, 1, 2].map(|k| sample[3 * N + k]);
+    let load = Measured {
+        force_on_arm: [y, z],
+        moment_on_arm,
+        ..Measured::none()
+    };
+    let found = equation.demanded(&motion, &[[0.0; MAX_STATES]; EFFECTS], &load);
+    found.iter().copied().collect()
 }
 
 fn refused((_, why): (usize, Invalid)) -> PyErr {

@@ -1,3 +1,4 @@
+use super::end_range::rises;
 use super::law::{Info, Law, Local, Parameter, Parameters, Place, leading};
 use super::prior::{Family, Prior};
 use crate::Scalar;
@@ -33,13 +34,14 @@ impl Law for BiarticularEndRange {
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        let [high, low] = rises(p, at);
+        let [high, low] = rises(p, angle(p, at));
         p[0] * high - p[1] * low
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
-        let [high, low] = rises(p, at);
-        let (x, slope) = (at.q + p[5] * at.proximal_q, p[0] * high + p[1] * low);
+        let x = angle(p, at);
+        let [high, low] = rises(p, x);
+        let slope = p[0] * high + p[1] * low;
         leading([
             high,
             -low,
@@ -56,9 +58,8 @@ impl Law for BiarticularEndRange {
     }
 }
 
-/// The two exponentials, one at each limit.
+/// The angle of both joints on which it depends.
 #[inline]
-fn rises<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> [T; 2] {
-    let x = at.q + p[5] * at.proximal_q;
-    [(p[2] * (x - p[3])).exp(), (-(p[2] * (x - p[4]))).exp()]
+fn angle<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
+    at.q + p[5] * at.proximal_q
 }

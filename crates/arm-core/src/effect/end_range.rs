@@ -35,12 +35,12 @@ impl Law for EndRange {
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {
-        let [high, low] = rises(p, at);
+        let [high, low] = rises(p, at.q);
         p[0] * high - p[1] * low
     }
 
     fn gradient<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> Parameters<T> {
-        let [high, low] = rises(p, at);
+        let [high, low] = rises(p, at.q);
         leading([
             high,
             -low,
@@ -51,11 +51,10 @@ impl Law for EndRange {
     }
 }
 
-/// The two exponentials, one at each limit.
-#[inline]
-fn rises<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> [T; 2] {
-    [
-        (p[2] * (at.q - p[3])).exp(),
-        (-(p[2] * (at.q - p[4]))).exp(),
-    ]
+/// The two exponentials, one at each limit, at an angle `x`.
+// On a device once in the code.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline)]
+pub(super) fn rises<T: Scalar>(p: &Parameters<T>, x: T) -> [T; 2] {
+    [(p[2] * (x - p[3])).exp(), (-(p[2] * (x - p[4]))).exp()]
 }

@@ -245,13 +245,11 @@ pub trait Law {
 /// zero at rest.
 #[inline]
 pub(super) fn smooth_sign<T: Scalar>(speed: T, smoothing: T) -> T {
-    let sign = T::if_less(
-        T::ZERO,
-        speed,
-        T::ONE,
-        T::if_less(speed, T::ZERO, -T::ONE, T::ZERO),
-    );
-    T::if_less(T::ZERO, smoothing, (speed / smoothing).tanh(), sign)
+    let sign = || {
+        let negative = T::if_less(speed, T::ZERO, -T::ONE, T::ZERO);
+        T::if_less(T::ZERO, speed, T::ONE, negative)
+    };
+    T::where_less(T::ZERO, smoothing, || (speed / smoothing).tanh(), sign)
 }
 
 /// Derivative of [`smooth_sign`] to `smoothing`, from its value.

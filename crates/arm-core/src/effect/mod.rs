@@ -129,29 +129,25 @@ macro_rules! catalogue {
                     Kind::Own(_) => [T::ZERO; MAX_PARAMETERS],
                 }
             }
-            /// Writes the derivatives to the linear parameters, which come first, into the columns from `column` on of all joints
-            /// in which it resists; nothing for an index beyond the arm.
-            #[inline]
-            pub(crate) fn add_columns<const N: usize, const P: usize>(
-                &self,
-                motion: &Motion<T, N>,
-                memory: States<T>,
-                column: usize,
-                rows: &mut [[T; P]; N],
-            ) {
+            /// Its torque for each unit of its linear parameters, which come first: all that a controller evaluates of a law. Zero for
+            /// other parameters, and for what resists in no joint.
+            // Once in the code, for every use of it.
+            #[inline(never)]
+            pub(crate) fn unit_torques<const N: usize>(&self, motion: &Motion<T, N>, memory: &States<T>) -> UnitTorques<T> {
+                let mut units = [T::ZERO; MAX_LINEAR];
                 match self.kind {
                     // Of a gradient of which less is read, less is computed.
                     $(Kind::$law => if <$module::$law as Law>::ACTS_ON.joints(<$module::$law as Law>::INFO.place) {
                         const LINEAR: usize = linear_parameters(<$module::$law as Law>::INFO.parameters);
-                        let gradient = $module::$law::gradient(&self.parameters, &motion.local(self.index, memory));
-                        write_columns::<T, N, P, LINEAR>(&gradient, self.index, T::ONE, column, rows);
-                        if $module::$law::CROSSES && self.index > 0 {
-                            let share = $module::$law::proximal_share(&self.parameters);
-                            write_columns::<T, N, P, LINEAR>(&gradient, self.index - 1, share, column, rows);
+                        const { assert!(LINEAR <= MAX_LINEAR) };
+                        let gradient = $module::$law::gradient(&self.parameters, &motion.local(self.index, *memory));
+                        for (unit, &value) in units.iter_mut().zip(&gradient).take(LINEAR) {
+                            *unit = value;
                         }
                     })*
                     Kind::Own(_) => {}
                 }
+                units
             }
             /// Factor with which the same torque also resists in the joint before.
             #[inline]
@@ -247,6 +243,12 @@ catalogue! {
     handle_slip::HandleSlip,
 }
 
+/// Most parameters in which the torque of one effect is linear.
+pub(crate) const MAX_LINEAR: usize = 2;
+
+/// Torques for each unit of the linear parameters of an effect \[N m\].
+pub(crate) type UnitTorques<T> = [T; MAX_LINEAR];
+
 /// How many parameters of a kind its torque is linear in.
 const fn linear_parameters(parameters: &[Parameter]) -> usize {
     let (mut count, mut i) = (0, 0);
@@ -255,22 +257,6 @@ const fn linear_parameters(parameters: &[Parameter]) -> usize {
         i += 1;
     }
     count
-}
-
-/// Writes the leading values of a gradient, times a factor, into the row of a joint.
-#[inline(always)]
-fn write_columns<T: Scalar, const N: usize, const P: usize, const LINEAR: usize>(
-    gradient: &Parameters<T>,
-    joint: usize,
-    factor: T,
-    column: usize,
-    rows: &mut [[T; P]; N],
-) {
-    let row = rows.get_mut(joint).and_then(|row| row.get_mut(column..));
-    let places = row.and_then(|row| row.first_chunk_mut::<LINEAR>());
-    for (place, &value) in places.into_iter().flatten().zip(gradient) {
-        *place = factor * value;
-    }
 }
 
 /// An entry of the catalogue, its prose only where that is wanted.
@@ -336,6 +322,12 @@ impl<T: Scalar> Effect<T> {
             *value = given;
         }
         self
+    }
+
+    /// [`Effect::proximal_share`] of one that also resists in the joint before.
+    #[inline]
+    pub(crate) fn share_before(&self) -> Option<T> {
+        self.kind.crosses().then(|| self.proximal_share())
     }
 
     /// Whether it is set-valued dry friction, or has some: no speed makes it smooth, and a simulation solves for it.

@@ -40,6 +40,13 @@ impl<T: Real> Cutoff<T> {
     }
 }
 
+/// Kept out of the way of the usual case.
+#[cold]
+#[inline(never)]
+fn no_number<T: Real>(value: T) -> bool {
+    !value.is_finite()
+}
+
 /// The two integrators.
 ///
 /// Well below the cutoff the second one moves by less than a last bit of single precision in a period. It would stick, and the
@@ -71,13 +78,6 @@ impl<T: Real> LowPass<T> {
 
     #[inline]
     fn step(&mut self, input: T, cutoff: &Cutoff<T>) -> Smooth<T> {
-        if input == T::ZERO && *self == Self::at(T::ZERO) {
-            // A sensor that is not there costs nothing.
-            return Smooth {
-                value: T::ZERO,
-                rate: T::ZERO,
-            };
-        }
         let error = (input - self.second) - self.lost;
         let band = cutoff.scale * (self.first + cutoff.g * error);
         let half = cutoff.g * band;
@@ -107,7 +107,7 @@ pub(super) struct Channel<T> {
     bridged: u32,
     /// Periods in a row with the same bits.
     unchanged: u32,
-    /// Whether it ever changed: a sensor that is not there cannot freeze.
+    /// Whether it ever changed: a sensor that is not there cannot freeze. Until then its low-passes are at rest, and cost nothing.
     alive: bool,
     first: LowPass<T>,
     of_value: LowPass<T>,
@@ -147,7 +147,7 @@ impl<T: Real> Channel<T> {
 
     /// What is wrong with the next value.
     ///
-    /// * `farthest` - that a value can move in one period
+    /// * `farthest` - that a value can move in one period; finite
     /// * `frozen_after` - periods in which the bits may stay the same; `None` while the arm rests
     #[inline]
     pub fn fault(
@@ -159,12 +159,18 @@ impl<T: Real> Channel<T> {
         let Some(value) = value else {
             return Some(Fault::Missing);
         };
-        if !value.is_finite() {
+        let moved = (value - self.last).abs();
+        // What is near is finite.
+        let near = moved <= farthest;
+        if !near && no_number(value) {
             return Some(Fault::NotFinite);
         }
         let same = value == self.raw;
-        self.alive |= !same;
-        self.unchanged = if same && self.alive && frozen_after.is_some() {
+        if same && !self.alive {
+            return None;
+        }
+        self.alive = true;
+        self.unchanged = if same && frozen_after.is_some() {
             self.unchanged.saturating_add(1)
         } else {
             0
@@ -173,8 +179,7 @@ impl<T: Real> Channel<T> {
         if frozen_after.is_some_and(|limit| self.unchanged > limit) {
             return Some(Fault::Frozen);
         }
-        let moved = (value - self.last).abs();
-        if moved <= farthest {
+        if near {
             return None;
         }
         let periods = T::of_count(u64::from(self.bridged) + 1);
@@ -194,6 +199,12 @@ impl<T: Real> Channel<T> {
                 self.bridged = self.bridged.saturating_add(1);
             }
         }
+        if !self.alive {
+            return Smooth {
+                value: self.last,
+                rate: T::ZERO,
+            };
+        }
         let smooth = self.first.step(self.last, cutoff);
         self.trend = (cutoff.g + cutoff.g) * smooth.rate;
         smooth
@@ -202,12 +213,18 @@ impl<T: Real> Channel<T> {
     /// The value behind the second low-pass.
     #[inline]
     pub fn value(&mut self, first: &Smooth<T>, cutoff: &Cutoff<T>) -> T {
+        if !self.alive {
+            return first.value;
+        }
         self.of_value.step(first.value, cutoff).value
     }
 
     /// The first and the second rate of [`Channel::value`].
     #[inline]
     pub fn rates(&mut self, first: &Smooth<T>, cutoff: &Cutoff<T>) -> [T; 2] {
+        if !self.alive {
+            return [T::ZERO; 2];
+        }
         let smooth = self.of_rate.step(first.rate, cutoff);
         [smooth.value, smooth.rate]
     }

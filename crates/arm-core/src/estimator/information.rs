@@ -2,6 +2,7 @@
 
 use core::array::from_fn;
 
+use crate::covariance::copy_triangle;
 use crate::scalar::Real;
 
 /// The triangular system `R x = z` whose least-squares solution is the estimate, with `RᵀR = UᵀDU` the inverse covariance.
@@ -48,6 +49,12 @@ impl<T: Real, const P: usize> Information<T, P> {
             *d = T::ONE / sd.squared();
             *z = mean;
         }
+    }
+
+    /// Becomes a copy of another.
+    pub fn set(&mut self, other: &Self) {
+        copy_triangle(&mut self.u, &other.u);
+        (self.d, self.z) = (other.d, other.z);
     }
 
     /// Takes in what some of the unknowns, `first` to before `end`, have of a row; the row goes on with what is left.

@@ -59,6 +59,9 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     moving: bool,
     /// Periods since the last row.
     since_row: u32,
+    /// The last sample behind the filters.
+    motion: Motion<T, N>,
+    measured: Measured<T, N>,
     memory: [States<T>; E],
     /// Usual size of the torque that the estimate does not explain \[N m\].
     usual: [T; N],
@@ -77,6 +80,8 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     bounded: Information<T, P>,
     /// That of the estimates, of the window that they were published with.
     covariance: Covariance<T, P>,
+    /// Standard deviations of the independent quantities behind that.
+    deviations: [T; P],
     fixed: [bool; P],
     /// The last that was solved for.
     solution: [T; P],
@@ -118,6 +123,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             settling: 0,
             moving: false,
             since_row: 0,
+            motion: Motion::new(T::ZERO, joints([T::ZERO; N]), joints([T::ZERO; N])),
+            measured: Measured::none(),
             memory: [[T::ZERO; MAX_STATES]; E],
             usual: tuning.noise,
             age: 0,
@@ -129,7 +136,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             row: None,
             information,
             bounded: information,
-            covariance: Covariance::independent(priors.map(|p| p.sd.squared())),
+            covariance: Covariance::independent(priors.map(|p| p.sd)),
+            deviations: [T::ZERO; P],
             fixed: [false; P],
             solution: [T::ZERO; P],
             prior_row: 0,
@@ -180,17 +188,19 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     /// With their standard deviation from the covariance of all unknowns, as of the last window. Give a motion without speed
     /// for the weight and the passive moments alone.
     pub fn carry(&self, motion: &Motion<T, N>) -> GravityCompensation<T, N> {
-        let mut rows = Needed::none();
-        self.equation.add_carrying(motion, &self.memory, &mut rows);
-        let torque = rows.torque_of(|i| self.estimates[i].value);
-        let expected = rows.torque_of(|i| self.priors[i].mean);
+        let values = |i: usize| match (self.estimates.get(i), self.priors.get(i)) {
+            (Some(estimate), Some(prior)) => [estimate.value, prior.mean],
+            _ => [T::ZERO; 2],
+        };
+        let ([torque, expected], sd) =
+            self.equation
+                .carried(motion, &self.memory, values, &self.covariance);
         let far = |j: usize| (torque[j] - expected[j]).abs();
-        let sd = |j: usize| self.excess * self.covariance.deviation(&rows.columns[j]);
         GravityCompensation {
             // Not a number is not within.
             within: (0..N).all(|j| far(j) <= self.tuning.envelope[j]),
             torque,
-            sd: joints(from_fn(sd)),
+            sd: joints(from_fn(|j| self.excess * sd[j])),
         }
     }
 
@@ -212,9 +222,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
 
     /// Filters, row and work are functions of their own, so that a period never needs the stack of two of them at once.
     fn step(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
-        let mut motion = Motion::new(T::ZERO, joints([T::ZERO; N]), joints([T::ZERO; N]));
-        let mut measured = Measured::none();
-        let sensed = self.sense(sample, &mut motion, &mut measured);
+        let sensed = self.sense(sample);
         self.since_row = self.since_row.saturating_add(1);
         let due = self.since_row >= self.tuning.stride && sensed.is_ok();
         // A row and the work on the last window take turns, so that no period has both.
@@ -222,7 +230,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             self.work();
         }
         let fault = match sensed {
-            Ok(()) => return self.learn(&motion, &measured, due),
+            Ok(()) => return self.learn(due),
             Err(heed) => heed,
         };
         if fault == SampleStatus::Refused(Fault::Frozen) {
@@ -238,12 +246,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
 
     /// Checks and filters a sample.
     #[inline(never)]
-    fn sense(
-        &mut self,
-        sample: Option<&Sample<T, N>>,
-        motion: &mut Motion<T, N>,
-        measured: &mut Measured<T, N>,
-    ) -> Result<(), SampleStatus> {
+    fn sense(&mut self, sample: Option<&Sample<T, N>>) -> Result<(), SampleStatus> {
         // A lead that comes or goes is another sensor.
         if !self.running || sample.is_some_and(|s| s.lead.is_some() != self.led) {
             return Err(self.start(sample));
@@ -254,11 +257,16 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let sample = sample.filter(|_| !implausible);
         let mut fault = implausible.then_some(Fault::Implausible);
         let [turn, load] = self.tuning.farthest;
+        let mut longest = 0;
         let mut pass = |channel: &mut Channel<T>, value: Option<T>, farthest: T| {
             let found = channel.fault(value, farthest, frozen_after);
             fault = fault.or(found);
             let good = if found.is_some() { None } else { value };
-            channel.step(good, &self.tuning.cutoff)
+            let smooth = channel.step(good, &self.tuning.cutoff);
+            if good.is_none() {
+                longest = longest.max(channel.bridged());
+            }
+            smooth
         };
         // Without a better lead the angles lead themselves.
         let mut filtered = |kind: usize| -> [Smooth<T>; N] {
@@ -273,8 +281,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let torque = filtered(2);
         let hand: [Smooth<T>; 3] =
             from_fn(|c| pass(&mut self.hand[c], sample.map(|s| s.of_hand(c)), load));
-        let all = self.joints.iter().flatten().chain(&self.hand);
-        if all.map(Channel::bridged).fold(0, Ord::max) > self.tuning.longest_gap {
+        if longest > self.tuning.longest_gap {
             self.running = false;
         }
         let pace = self.tuning.pace;
@@ -282,6 +289,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         let [angles, leads, torques] = &mut self.joints;
         let leads = if self.led { leads } else { &mut *angles };
         let rates: [[T; 2]; N] = from_fn(|j| leads[j].rates(&lead[j], cutoff));
+        let (motion, measured) = (&mut self.motion, &mut self.measured);
         motion.q = joints(from_fn(|j| angles[j].value(&angle[j], cutoff)));
         motion.qd = joints(rates.map(|[rate, _]| rate * pace));
         motion.qdd = joints(rates.map(|[_, rate]| rate * pace.squared()));
@@ -291,7 +299,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.moving = motion.qd.iter().any(|qd| qd.abs() > self.tuning.dead_band);
         self.equation
             .advance(motion, &mut self.memory, self.tuning.period);
-        if !self.finite(motion, measured) {
+        if !self.finite() {
             self.restart();
             return Err(SampleStatus::Refused(Fault::Restarted));
         }
@@ -306,14 +314,18 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     /// Whether nothing that is filtered has become NaN or infinite.
-    fn finite(&self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> bool {
+    fn finite(&self) -> bool {
+        let (motion, measured) = (&self.motion, &self.measured);
         // A sum is not finite where one of its terms is not, and is taken faster than a look at each.
         let mut sum = measured.moment_on_arm + measured.force_on_arm[0] + measured.force_on_arm[1];
         for j in 0..N {
             sum += motion.q[j] + motion.qd[j] + motion.qdd[j] + measured.torque[j] + self.usual[j];
         }
-        let states = self.memory.as_flattened().iter();
-        states.fold(sum, |sum, &state| sum + state).is_finite()
+        if self.equation.remembers() {
+            let states = self.memory.as_flattened().iter();
+            sum = states.fold(sum, |sum, &state| sum + state);
+        }
+        sum.is_finite()
     }
 
     /// Starts anew what a value that is not finite has spoiled: filters, states of effects, and what is usual.
@@ -360,15 +372,10 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     ///
     /// At rest it is added as well, for to leave out slow samples would favour one side of every reversal; what counts is
     /// whether the arm moved at any time in the window.
-    fn learn(
-        &mut self,
-        motion: &Motion<T, N>,
-        measured: &Measured<T, N>,
-        due: bool,
-    ) -> SampleStatus {
+    fn learn(&mut self, due: bool) -> SampleStatus {
         let heed = if due {
             self.since_row = 0;
-            self.weigh(motion, measured)
+            self.weigh()
         } else {
             SampleStatus::Taken
         };
@@ -381,11 +388,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     #[inline(never)]
-    fn weigh(&mut self, motion: &Motion<T, N>, measured: &Measured<T, N>) -> SampleStatus {
+    fn weigh(&mut self) -> SampleStatus {
         let mut rows = Needed::none();
-        let acting = self
-            .equation
-            .add_needed(motion, &self.memory, measured, &mut rows);
+        let acting =
+            self.equation
+                .add_needed(&self.motion, &self.memory, &self.measured, &mut rows);
         let expected = rows.torque_of(|i| self.estimates[i].value);
         let rest: [T; N] = from_fn(|j| (acting[j] - expected[j]).abs());
         // What is still uncertain may show at any time; correlations would only lessen it.

@@ -43,7 +43,7 @@ impl Work {
             Self::Wait(_) => usize::MAX,
             Self::Row(_) => 20 * p + rotation(0) - rotation(split(p)),
             Self::Rest(_) => rotation(split(p)),
-            Self::Copy => 4 * p * p,
+            Self::Copy => 2 * p * p,
             Self::Solve => 6 * p * p + 36 * p,
             Self::Fix { unknown, .. } => rotation(unknown + 1) + 40 * p,
             Self::Publish => 40 * n * p,

@@ -139,6 +139,8 @@ const LONGEST_GAP: f64 = 0.02;
 const SETTLING: f64 = 1.5;
 /// Rows in a period of the low-pass' cutoff. What it lets through changes so slowly that more would say the same again.
 const ROWS_PER_PERIOD: f64 = 20.0;
+/// Largest change in a period that is told from an infinite one.
+const LARGEST: f64 = f32::MAX as f64;
 /// Share of its samples that a window needs.
 const ENOUGH: f64 = 0.5;
 /// Rows that a window has at least, where the sampling allows.
@@ -210,7 +212,7 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             gate: s.gate,
             range: s.range,
             largest: [s.largest_force, s.largest_torque],
-            farthest: [s.fastest * s.period, s.steepest * s.period],
+            farthest: [s.fastest, s.steepest].map(|pace| (pace * s.period).min(T::of(LARGEST))),
             envelope: s.envelope,
             frozen_after: frozen,
             longest_gap: periods(T::of(LONGEST_GAP) / period).max(2),

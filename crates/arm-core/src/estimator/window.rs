@@ -37,14 +37,15 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
             return;
         }
         self.counts[joint] += 1;
+        let pairs = self.columns[joint].iter_mut().zip(columns);
         if self.counts[joint] == 1 {
-            (self.columns[joint], self.values[joint]) = (*columns, value);
-            return;
+            // Added to nothing: the copying of memory in general takes longer.
+            pairs.for_each(|(sum, &column)| *sum = T::ZERO + column);
+            self.values[joint] = value;
+        } else {
+            pairs.for_each(|(sum, &column)| *sum += column);
+            self.values[joint] += value;
         }
-        for (sum, &column) in self.columns[joint].iter_mut().zip(columns) {
-            *sum += column;
-        }
-        self.values[joint] += value;
     }
 
     /// The mean row of a joint. `None` with too few rows.

@@ -3,7 +3,7 @@
 use super::information::Row;
 use super::schedule::{Work, split};
 use super::{Decision, Estimate, Estimator};
-use crate::covariance::Covariance;
+use crate::covariance::{Covariance, copy_triangle};
 use crate::scalar::Real;
 
 /// Share of the prior's variance that the data must have taken away before an unknown counts as identified.
@@ -51,7 +51,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 }
             }
             Work::Copy => {
-                self.bounded = self.information;
+                self.bounded.set(&self.information);
                 self.fixed = [false; P];
                 Work::Solve
             }
@@ -76,8 +76,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                     Work::Deviations(first + N)
                 } else {
                     // The last rows are short, which leaves time for this.
-                    self.covariance.rows = self.bounded.u;
-                    self.covariance.variances = self.information.d.map(|d| T::ONE / d);
+                    copy_triangle(&mut self.covariance.root, &self.bounded.u);
                     Work::Idle
                 }
             }
@@ -143,7 +142,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         for (estimate, prior) in self.estimates.iter_mut().zip(&self.priors) {
             *estimate = Estimate::of_prior(prior);
         }
-        self.covariance = Covariance::independent(self.priors.map(|p| p.sd.squared()));
+        self.covariance = Covariance::independent(self.priors.map(|p| p.sd));
         self.residual = [T::ZERO; 2];
         self.last_residual = [None; N];
         self.judged = T::ZERO;
@@ -158,6 +157,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             let prior = &self.priors[i];
             self.estimates[i].value = self.solution[i].max(prior.min).min(prior.max);
         }
+        self.deviations = self.information.d.map(|d| (T::ONE / d).sqrt());
         self.judged = (self.judged + T::ONE).min(T::of(LONG));
         let (mut square, mut product, mut count) = (T::ZERO, T::ZERO, T::ZERO);
         for j in 0..N {
@@ -186,7 +186,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.excess = (square.max(T::ONE) * (T::ONE + alike) / (T::ONE - alike)).sqrt();
     }
 
-    /// How certain some unknowns are, from one on, and by what; their rows of the next covariance.
+    /// How certain some unknowns are, from one on, and by what; their rows of the root of the next covariance.
     fn judge(&mut self, first: usize) {
         // Where fewer are left, some before are judged again.
         let first = first.min(P.saturating_sub(N));
@@ -197,8 +197,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         self.information.inverse_rows(first, rows);
         let estimates = self.estimates.iter_mut().zip(&self.priors).zip(&self.fixed);
         for (((estimate, prior), &fixed), row) in estimates.skip(first).zip(rows) {
-            let squares = row.iter().zip(&self.information.d);
-            let variance = squares.fold(T::ZERO, |sum, (&r, &d)| sum + r.squared() / d);
+            let mut variance = T::ZERO;
+            for (place, &sd) in row.iter_mut().zip(&self.deviations) {
+                *place = *place * sd;
+                variance += place.squared();
+            }
             let sd = variance.sqrt() * self.excess;
             let left = (sd / prior.sd).squared();
             estimate.sd = sd.min(prior.sd);

@@ -2,11 +2,11 @@
 
 use core::array::from_fn;
 
-use arm_core::effect::{Effect, Kind, Motion, States, resisting_torque};
+use arm_core::effect::{ActsOn, Effect, KINDS, Kind, Motion, States, resisting_torque};
 use arm_core::estimator::{Decision, Estimator, Fault, Sample, SampleStatus, Settings};
 use arm_core::{
     Compensation, Equation, Invalid, Joints, Measured, Pose, Prior, gravity, inverse_dynamics,
-    models, static_torque,
+    joint_force, models, static_torque,
 };
 
 use crate::common::Random;
@@ -71,6 +71,40 @@ fn the_columns_times_the_unknowns_are_the_torque_that_a_motion_needs() {
         // The exponentials of the end stops reach 1e9.
         let off = (rows.torque(&values) - expected).norm() / expected.norm().max(1.0);
         assert!(off < 1e-12, "{off}");
+    }
+}
+
+/// A device evaluates each law for a unit of its parameters, a simulation as a whole.
+#[test]
+fn a_device_resists_as_the_laws_say() {
+    let (arm, mut random) = (models::human_arm(), Random(27));
+    for &kind in KINDS.iter().filter(|k| k.acts_on() == ActsOn::Joints) {
+        for _ in 0..100 {
+            let effect: Effect<f64> = random.effect(kind, 1);
+            let equation = Equation::<f64, 3, 18, 1>::new(arm, [effect]).expect("an arm");
+            let (motion, memory): (Motion<f64, 3>, _) = (random.motion(), [random.states()]);
+            let force_on_arm = [random.uniform(-9.0, 9.0), random.uniform(-9.0, 9.0)];
+            let pose = Pose::new(&motion.q);
+            let load = Measured {
+                force_on_arm,
+                ..Measured::none()
+            };
+            let felt = motion.with_joint_force(&joint_force(
+                &arm,
+                &pose,
+                (&motion.qd, &motion.qdd),
+                force_on_arm,
+            ));
+            let expected = resisting_torque(&[effect], &felt, &memory);
+            let found = equation.resisting(&pose, &motion, &memory, force_on_arm);
+            let most = 1e-14 * expected.amax().max(1.0);
+            assert!((found - expected).amax() <= most, "{}", kind.info().kind);
+            let demanded = equation.demanded(&motion, &memory, &load);
+            let (rows, pushed) = equation.needed(&motion, &memory, &load);
+            let needed = rows.torque(&equation.priors(0.1).map(|p| p.mean)) - pushed;
+            let off = (demanded - needed).amax() / needed.amax().max(1.0);
+            assert!(off < 1e-12, "{} {off}", kind.info().kind);
+        }
     }
 }
 

@@ -1,14 +1,13 @@
 //! The equation of motion as rows that are linear in what is not known: base parameters and effects.
 
-use core::array::from_fn;
+mod rows;
+mod torques;
 
 use crate::effect::{
-    ActsOn, Effect, Motion, Place, States, advance_states, any_state, resisting_torque,
+    ActsOn, Effect, Kind, Motion, Parameter, Place, States, advance_states, any_state,
 };
-use crate::kinematics::to_links;
-use crate::regressor::link_columns;
 use crate::scalar::Real;
-use crate::{Chain, Invalid, Joints, Pose, Scalar, check, joint_force, joints, static_torque};
+use crate::{Chain, Invalid, Joints, Scalar, check, joints};
 
 /// What is known of an unknown before any data, and what it may never be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,8 +43,8 @@ const OPEN: f64 = 10.0;
 pub struct Equation<T, const N: usize, const P: usize, const E: usize> {
     chain: Chain<T, N>,
     effects: [Effect<T>; E],
-    /// How many parameters of each effect are unknowns: the leading ones, see [`Info`](crate::effect::Info).
-    linear: [usize; E],
+    /// The first unknown of each effect, see [`Info`](crate::effect::Info).
+    first: [u8; E],
     used: usize,
     feels_force: bool,
     /// Whether some effect has a state of its own.
@@ -120,8 +119,8 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     /// [`Invalid`] for an effect that does not suit the arm, and for more unknowns than `P`.
     pub fn new(chain: Chain<T, N>, effects: [Effect<T>; E]) -> Result<Self, Invalid> {
         let mut used = 2 * N;
-        let mut leading = [0; E];
-        for (effect, count) in effects.iter().zip(&mut leading).filter(|(e, _)| e.on) {
+        let mut first = [0; E];
+        for (effect, first) in effects.iter().zip(&mut first).filter(|(e, _)| e.on) {
             effect.validate(N)?;
             // A rotor is an unknown like others: its column is the acceleration.
             if effect.kind.acts_on() != ActsOn::Joints && effect.kind.info().place != Place::Joint {
@@ -129,8 +128,8 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
                     kind: effect.kind.info().kind,
                 });
             }
-            *count = linear(effect).count();
-            used += *count;
+            *first = used as u8;
+            used += linear(effect).count();
         }
         if used > P {
             return Err(Invalid::OutOfRange {
@@ -144,7 +143,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         Ok(Self {
             chain,
             effects,
-            linear: leading,
+            first,
             used,
             remembers: any_state(&effects),
             feels_force: effects.iter().any(|e| e.on && e.kind.feels_force()),
@@ -162,6 +161,10 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     /// Whether an effect depends on the forces through the joints; otherwise they need not be computed.
     pub fn feels_force(&self) -> bool {
         self.feels_force
+    }
+    /// Whether some effect has states of its own, which [`Equation::advance`] carries on.
+    pub fn remembers(&self) -> bool {
+        self.remembers
     }
     /// Number of unknowns in use; the others have no influence.
     pub fn used(&self) -> usize {
@@ -242,91 +245,14 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
                 }
             }
         }
+        // What is linear comes first.
         for effect in effects.iter_mut().filter(|e| e.on) {
-            let parameters = effect.kind.info().parameters;
-            for (value, _) in effect
-                .parameters
-                .iter_mut()
-                .zip(parameters)
-                .filter(|(_, p)| p.linear)
-            {
-                if let Some(&new) = next.next() {
-                    *value = new;
-                }
+            let count = linear(effect).count();
+            for (value, &new) in effect.parameters.iter_mut().take(count).zip(&mut next) {
+                *value = new;
             }
         }
         (chain, effects)
-    }
-
-    /// The torques that a motion needs.
-    ///
-    /// * `motion` - without joint forces: they are taken from the arm as expected and from `measured`
-    /// * `memory` - the states of each effect
-    pub fn needed(
-        &self,
-        motion: &Motion<T, N>,
-        memory: &[States<T>; E],
-        measured: &Measured<T, N>,
-    ) -> (Needed<T, N, P>, Joints<T, N>) {
-        let mut rows = Needed::none();
-        let acting = self.add_needed(motion, memory, measured, &mut rows);
-        (rows, acting)
-    }
-
-    /// [`Equation::needed`], into rows that hold nothing yet; what acts.
-    #[inline]
-    pub(crate) fn add_needed(
-        &self,
-        motion: &Motion<T, N>,
-        memory: &[States<T>; E],
-        measured: &Measured<T, N>,
-        rows: &mut Needed<T, N, P>,
-    ) -> Joints<T, N> {
-        let pose = Pose::new(&motion.q);
-        self.add_inertial(&pose, [&motion.qd, &motion.qdd], rows);
-        if self.feels_force() {
-            self.add_effects_under_load(&pose, motion, memory, measured.force_on_arm, rows);
-        } else {
-            self.add_effects(motion, memory, rows);
-        }
-        let acting = static_torque(
-            &self.chain,
-            &pose,
-            measured.force_on_arm,
-            measured.moment_on_arm,
-        );
-        joints(from_fn(|j| acting[j] + measured.torque[j]))
-    }
-
-    /// The torques that carry the arm: its weight, and what its effects resist with at this motion. Inertia is left out.
-    pub fn carrying(&self, motion: &Motion<T, N>, memory: &[States<T>; E]) -> Needed<T, N, P> {
-        let mut rows = Needed::none();
-        self.add_carrying(motion, memory, &mut rows);
-        rows
-    }
-
-    /// [`Equation::carrying`], into rows that hold nothing yet.
-    #[inline]
-    pub(crate) fn add_carrying(
-        &self,
-        motion: &Motion<T, N>,
-        memory: &[States<T>; E],
-        rows: &mut Needed<T, N, P>,
-    ) {
-        // The regressor of an arm at rest.
-        let pose = Pose::new(&motion.q);
-        let [gy, gz] = self.chain.gravity;
-        for k in 0..N {
-            let x = gy * pose.sin[k] - gz * pose.cos[k];
-            let h = (gy * pose.cos[k] + gz * pose.sin[k]) * self.chain.h[k];
-            for j in 0..=k {
-                rows.known[j] += h;
-                if k < P {
-                    rows.columns[j][k] = x;
-                }
-            }
-        }
-        self.add_effects(motion, memory, rows);
     }
 
     /// The states of the effects one period later, the motion taken as constant in it.
@@ -336,73 +262,14 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
             advance_states(&self.effects, (motion, motion), memory, period);
         }
     }
-
-    #[inline(never)]
-    fn add_inertial(
-        &self,
-        pose: &Pose<T, N>,
-        [qd, qdd]: [&Joints<T, N>; 2],
-        rows: &mut Needed<T, N, P>,
-    ) {
-        let moving = [&to_links(qd), &to_links(qdd)];
-        for j in 0..N {
-            rows.known[j] = self.chain.rotor[j] * qdd[j];
-        }
-        for k in 0..N {
-            let [x, h, inertia] = link_columns(&self.chain, pose, moving, k);
-            for (j, row) in rows.columns.iter_mut().enumerate() {
-                for (place, column) in [(k, &x), (N + k, &inertia)] {
-                    if let Some(place) = row.get_mut(place) {
-                        *place = column[j];
-                    }
-                }
-                rows.known[j] += h[j] * self.chain.h[k];
-            }
-        }
-    }
-
-    #[inline(never)]
-    fn add_effects_under_load(
-        &self,
-        pose: &Pose<T, N>,
-        motion: &Motion<T, N>,
-        memory: &[States<T>; E],
-        force_on_arm: [T; 2],
-        rows: &mut Needed<T, N, P>,
-    ) {
-        let moving = (&motion.qd, &motion.qdd);
-        let force = joint_force(&self.chain, pose, moving, force_on_arm);
-        self.add_effects(&motion.with_joint_force(&force), memory, rows);
-    }
-
-    #[inline(never)]
-    fn add_effects(
-        &self,
-        motion: &Motion<T, N>,
-        memory: &[States<T>; E],
-        rows: &mut Needed<T, N, P>,
-    ) {
-        let mut column = 2 * N;
-        for ((effect, &count), &state) in self.effects.iter().zip(&self.linear).zip(memory) {
-            if !effect.on {
-                continue;
-            }
-            if count == 0 {
-                let one = core::slice::from_ref(effect);
-                rows.known += resisting_torque(one, motion, &[state]);
-            } else {
-                effect.add_columns(motion, state, column, &mut rows.columns);
-                column += count;
-            }
-        }
-    }
 }
 
-/// Values and descriptions of the linear parameters of an effect.
-fn linear<T: Scalar>(
-    effect: &Effect<T>,
-) -> impl Iterator<Item = (T, &'static crate::effect::Parameter)> {
-    let parameters = effect.kind.info().parameters;
-    let values = effect.parameters.into_iter().zip(parameters);
-    values.filter(|(_, p)| p.linear)
+/// Values and descriptions of the linear parameters of an effect; a law of one's own has none that are fitted.
+fn linear<T: Scalar>(effect: &Effect<T>) -> impl Iterator<Item = (T, &'static Parameter)> {
+    let fitted = !matches!(effect.kind, Kind::Own(_));
+    let values = effect
+        .parameters
+        .into_iter()
+        .zip(effect.kind.info().parameters);
+    values.filter(move |(_, p)| fitted && p.linear)
 }
