@@ -4,6 +4,8 @@ Asked of every case: a status of 0, 1, 2, 130 or 143 and no traceback; at most 1
 behind after a refusal, neither the output folder nor temporary files. The seed gives the same cases again; each that fails is kept below
 `--keep` with the command and what it printed.
 
+Ctrl-C ends it and tells of the cases that were run.
+
 A case takes milliseconds: it runs in a process that is forked from one in which everything is loaded, 1000 to a process; the folders are in
 memory where the system has such; and of the cases only one in 20 draws its figures, while the others write an empty image in their place.
 """
@@ -318,15 +320,17 @@ def main() -> int:
         accepted_at_first(seeds, Place(folder, home))
         begun, wrong, most = time.monotonic(), Counter[str](), Most()
         next_case, end = asked.first, asked.first + asked.cases if asked.cases else sys.maxsize
-        while next_case < end and (asked.cases or time.monotonic() - begun < 60.0 * asked.minutes):
-            numbers = range(next_case, min(end, next_case + AT_ONCE))
-            done, why = batch(numbers, asked.seed, seeds, folder, home, most)
-            next_case += done
-            if why:
-                case = case_of(next_case - 1, asked.seed, seeds, folder)
-                keep(case, why, home, place)
-                wrong[f"{case.seed.file}: {why[:100]}"] += 1
-                print(f"{next_case - 1}: armrs {' '.join(case.command)}, {case.seed.file}: {why[:300]}", flush=True)
+        with contextlib.suppress(KeyboardInterrupt):
+            while next_case < end and (asked.cases or time.monotonic() - begun < 60.0 * asked.minutes):
+                numbers = range(next_case, min(end, next_case + AT_ONCE))
+                print(f"\r{next_case - asked.first} changed files", end="", file=sys.stderr, flush=True)
+                done, why = batch(numbers, asked.seed, seeds, folder, home, most)
+                next_case += done
+                if why:
+                    case = case_of(next_case - 1, asked.seed, seeds, folder)
+                    keep(case, why, home, place)
+                    wrong[f"{case.seed.file}: {why[:100]}"] += 1
+                    print(f"{next_case - 1}: armrs {' '.join(case.command)}, {case.seed.file}: {why[:300]}", flush=True)
         count = next_case - asked.first
         print(f"{count} changed files of {len(seeds)} formats in {time.monotonic() - begun:.0f} s: {sum(wrong.values())} wrong")
         if most.long:
