@@ -135,7 +135,7 @@ def _passive(result: Mapping[str, Any]) -> str:
     parts = []
     for curve in result["curves"]:
         low, high = curve.get("half_width_interval_Nm") or (None, None)
-        unclear = low is not None and low <= 0.0 < high
+        unclear = low is not None and high is not None and low <= 0.0 < high
         size = f"at most {high:.2g}" if unclear else f"{curve['half_width_mean_Nm']:.3g}"
         parts.append(f"{curve['joint_name']} {size} N m ({curve['configuration']})")
     return f"Half the width of the hysteresis: {'; '.join(parts)}."
