@@ -218,6 +218,12 @@ def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(autouse=True)
+def no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How far a command is, it says after five seconds: what a test reads would depend on how busy the machine is."""
+    monkeypatch.setattr("armrs.report.console.FIRST_LINE", 3600.0)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def one_browser() -> Iterator[None]:
     """All pages of a file are opened in one browser."""
