@@ -34,6 +34,9 @@ RUNAWAY = 30.0
 PIECE = 16384
 """Samples of a run that are held, drawn and written at once."""
 _MOST_STEPS = 10**9
+_MOST_SEEDS = 10**5
+_MOST_START = 100.0
+"""Largest angle to start from [rad], as of a rest angle: turns beyond change nothing but the precision."""
 _CHANNELS = ("angle", "force", "moment", "robot", "torque")
 
 
@@ -478,7 +481,7 @@ def _asked(
     checks.instance("drive", drive, Movement, Trial, type(None))
     checks.number("dt", dt, above=0.0, unit="s")
     checks.number("rate", rate, above=0.0, unit="Hz")
-    steps = 1.0 / (rate * dt)
+    steps = 1.0 / max(rate * dt, 1e-18)  # what is next to zero is refused with the length of the run
     if steps < 1.0 - 1e-6:
         raise BadInput("dt, rate", _clock(dt, rate), "at least one step from sample to sample")
     if abs(steps - round(steps)) > 1e-6 * steps:
@@ -502,7 +505,7 @@ def _asked(
         dt=dt,
         duration=duration,
         output_interval=1.0 / rate,
-        q=None if angles is None else checks.numbers("start", angles, "rad").reshape(-1).tolist(),
+        q=None if angles is None else _start(angles),
         qd=None if speeds is None else checks.numbers("start_speed", speeds, "rad/s").reshape(-1).tolist(),
     )
     settings = {
@@ -529,6 +532,13 @@ def _clock(dt: float, rate: float) -> Text:
     return Text(f"a step of {dt:g} s and {rate:g} Hz")
 
 
+def _start(angles: np.ndarray) -> list[float]:
+    found = checks.numbers("start", angles, "rad").reshape(-1)
+    for k, angle in enumerate(found):
+        checks.number(f"start[{k}]", float(angle), least=-_MOST_START, most=_MOST_START, unit="rad")
+    return found.tolist()
+
+
 def _check_duration(duration: float, dt: float, rate: float) -> None:
     """Refuse a length of a run that is no whole number of steps, or holds no sample interval."""
     checks.number("duration", duration, above=0.0, unit="s")
@@ -542,6 +552,8 @@ def _check_duration(duration: float, dt: float, rate: float) -> None:
 def _seeded(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> tuple[Sensors, list[int]] | None:
     """Return sensors with their seeds; what would silently have no effect is refused."""
     checks.instance("seeds", seeds, list, tuple, range, np.ndarray)
+    if len(seeds) > _MOST_SEEDS:
+        raise BadInput("seeds", Text(f"{len(seeds)} of them"), f"at most {_MOST_SEEDS}")
     read = [checks.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
     if sensors is None:
         if read:
