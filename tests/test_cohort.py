@@ -111,6 +111,7 @@ def test_a_folder_of_results_is_read_with_its_groups(slow_arm: Path, tmp_path: P
     [
         ("subject,value\na,1\n", "quantity"),
         ("subject,quantity,value\na,k,x\n", "row 2, value"),
+        ("subject,quantity,value\na,k,1e308\nb,k,-1e308\nc,k,1\n", r"row 2, value: found '1e308', allowed a number below 1e\+100"),
         ("subject,quantity,value\n,k,1\n", "row 2, subject"),
         ("subject,quantity,value\n", "a value a row"),
         ("subject,quantity,value,unit\na,k,1,N m\nb,k,1,kN m\n", "one unit a quantity"),

@@ -166,6 +166,8 @@ class Cohort(Tabular):
 
 _COMPUTED = 0.8
 """Share of the work after which the passive moments of data sets are known."""
+_MOST = 1e100
+"""Values of a table are below it, of any quantity in any unit: squares of larger ones overflow."""
 ALL = "all"
 """The group of those of whom none is stated."""
 
@@ -322,8 +324,8 @@ def _number(row: Mapping[str, str], name: str, number: int, path: Path) -> float
         found = float(row[name])
     except ValueError:
         found = np.nan
-    if not np.isfinite(found):
-        raise BadInput(f"row {number}, {name}", row[name], "a finite number", file=path)
+    if not abs(found) < _MOST:
+        raise BadInput(f"row {number}, {name}", row[name], f"a number below {_MOST:g}", file=path)
     return found
 
 
