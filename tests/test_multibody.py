@@ -123,6 +123,23 @@ def test_what_a_format_cannot_hold_is_listed(tmp_path: Path) -> None:
         assert any(words in line for line in lost), words
 
 
+@pytest.mark.parametrize(
+    ("suffix", "old", "new", "said"),
+    [
+        (".urdf", 'type="continuous"', 'type="revolute"', "shoulder"),
+        (".xml", '<joint name="shoulder"', '<joint name="shoulder" range="-1 1"', "shoulder"),
+        (".xml", '<joint name="shoulder"', '<joint name="shoulder" range="-1 1" limited="false"', None),
+    ],
+)
+def test_stops_of_a_file_are_said_to_be_left_out(suffix: str, old: str, new: str, said: str | None, tmp_path: Path) -> None:
+    path = armrs.export_model(DAMPED, tmp_path / f"arm{suffix}").path
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    notes = [note for note in read_model(path).notes if "the range of motion is left out" in note]
+    assert [note.split(":")[0] for note in notes] == ([] if said is None else [said])
+
+
 def edited(change: Callable[[str], str]) -> Callable[[Path], Path]:
     def write(folder: Path) -> Path:
         path = armrs.export_model(DAMPED, folder / "arm.urdf").path

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -53,6 +53,13 @@ class Imported:
     model: Model
     notes: tuple[str, ...]
     zeros: tuple[float, ...]
+
+    def without_stops(self, joints: Sequence[str]) -> Imported:
+        """Say which joints of the file have a range: a chain of segments has no stops."""
+        if not joints:
+            return self
+        note = f"{', '.join(joints)}: the range of motion is left out; effect end_range gives a joint stiffness at the ends of one"
+        return replace(self, notes=(*self.notes, note))
 
 
 def planar(hinges: Sequence[Hinge], tip: np.ndarray | None, gravity: float = 9.81) -> Imported:

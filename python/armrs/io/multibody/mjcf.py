@@ -103,7 +103,12 @@ def read(text: str) -> Imported:
     sites = body.findall("site")
     found = planar(hinges, turned @ _place(sites[-1]) if sites else None, -gravity[2])
     springs = [_spring(fixed, [hinge.joint.name for hinge in hinges], found.zeros) for fixed in root.findall("tendon/fixed")]
-    return replace(found, model=found.model.replace(effects=(*rotors, *springs)))
+    compiler = root.find("compiler")
+    unsaid = "true" if compiler is None else compiler.get("autolimits", "true")
+    limited = {"auto": unsaid, "true": "true", "false": "false"}
+    hinges_with_range = [joint for joint in bodies[0].iter("joint") if joint.get("range") is not None]
+    stopped = [joint.get("name", "joint") for joint in hinges_with_range if limited.get(joint.get("limited", "auto")) == "true"]
+    return replace(found, model=found.model.replace(effects=(*rotors, *springs))).without_stops(stopped)
 
 
 def _angle(root: ET.Element) -> str:

@@ -73,7 +73,8 @@ def read(text: str) -> Imported:
     roots = [name for name in dict.fromkeys([*links, *by_parent]) if name not in children]  # `world` may have no link of its own
     if len(roots) != 1:
         raise BadInput("links", Text(f"{len(roots)} roots"), "one")
-    return _walk(roots[0], links, by_parent)
+    stopped = [joint.get("name", "") for joint in robot.findall("joint") if joint.get("type") == "revolute"]
+    return _walk(roots[0], links, by_parent).without_stops(stopped)
 
 
 def _end(joint: ET.Element, which: str) -> str:
