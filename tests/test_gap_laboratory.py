@@ -14,8 +14,7 @@ SWEEP = Path(__file__).parents[1] / "bench" / "sweep" / "little_known" / "SWEEP.
 
 def test_no_second_dry_law_stands_for_how_joints_creep() -> None:
     """Dry friction in three joints creeps below 0.01 rad/s: a joint for which another speed was chosen showed a load friction as well."""
-    sweep = dataclasses.replace(load_sweep(SWEEP), seed=1396007)
-    experiment = sweep.experiment(sweep.seed_of(1), list(zip(sweep.vary, sweep.draws(1), strict=True)))
+    experiment = dataclasses.replace(load_sweep(SWEEP), seed=1396007).drawn(1)
     found = armrs.find_gap(measure(experiment).dataset, separate=False, threads=2)
     laws = {(kind, joint) for kind in ("elastic", "viscous", "coulomb") for joint in (1, 2, 3)}
     assert {(e.kind, e.joint) for e in found.effects} == laws

@@ -52,8 +52,7 @@ def main() -> None:
     sweep = load_sweep(Path(__file__).parents[1] / "sweep" / "little_known" / "SWEEP.toml")
     made = []
     for seed in range(options.seed, options.seed + options.count):
-        drawn = dataclasses.replace(sweep, seed=seed)
-        experiment = drawn.experiment(drawn.seed_of(1), list(zip(drawn.vary, drawn.draws(1), strict=True)))
+        experiment = dataclasses.replace(sweep, seed=seed).drawn(1)
         folder = options.folder / f"l{seed}"
         shutil.rmtree(folder, ignore_errors=True)
         record(experiment, folder / "all")

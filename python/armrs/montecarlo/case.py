@@ -45,7 +45,7 @@ def _case(sweep: Sweep, number: int) -> tuple[Row, list[Row]]:
         if sweep.dataset is not None:
             dataset, truth = resampled(sweep.dataset, [seed, 0]), None
         else:
-            experiment = sweep.experiment(seed, list(zip(sweep.vary, draws, strict=True)))
+            experiment = sweep.drawn(number)
             measured = measure(experiment)
             dataset, truth = measured.dataset, experiment.truth
             row["stopped"] = sum(story["stop"] is not None for story in measured.trials)

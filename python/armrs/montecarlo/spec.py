@@ -90,6 +90,10 @@ class Sweep:
         seed = self.seed_of(case)
         return [v.draw(seed, k) for k, v in enumerate(self.vary)]
 
+    def drawn(self, case: int) -> Experiment:
+        """Return the experiment of a case, counted from 1: with its seed and the values drawn for it."""
+        return self.experiment(self.seed_of(case), list(zip(self.vary, self.draws(case), strict=True)))
+
     def experiment(self, seed: int, changes: list[tuple[Vary, Any]]) -> Experiment:
         """Return the experiment with some values changed.
 
