@@ -331,6 +331,7 @@ def main() -> int:
                     keep(case, why, home, place)
                     wrong[f"{case.seed.file}: {why[:100]}"] += 1
                     print(f"{next_case - 1}: armrs {' '.join(case.command)}, {case.seed.file}: {why[:300]}", flush=True)
+        print(file=sys.stderr)
         count = next_case - asked.first
         print(f"{count} changed files of {len(seeds)} formats in {time.monotonic() - begun:.0f} s: {sum(wrong.values())} wrong")
         if most.long:

@@ -84,7 +84,7 @@ def read(text: str) -> Imported:
     bodies = world.findall("body") if world is not None else []
     if len(bodies) != 1:
         raise BadInput("<worldbody>", Text(f"{len(bodies)} bodies"), "one chain")
-    turn = 1.0 if _angle(root) == "radian" else math.pi / 180.0
+    turn = 1.0 if _compiler(root, "angle", "degree") == "radian" else math.pi / 180.0
     hinges: list[Hinge] = []
     rotors: list[Effect] = []
     turned, body = np.eye(3), bodies[0]
@@ -103,17 +103,17 @@ def read(text: str) -> Imported:
     sites = body.findall("site")
     found = planar(hinges, turned @ _place(sites[-1]) if sites else None, -gravity[2])
     springs = [_spring(fixed, [hinge.joint.name for hinge in hinges], found.zeros) for fixed in root.findall("tendon/fixed")]
-    compiler = root.find("compiler")
-    unsaid = "true" if compiler is None else compiler.get("autolimits", "true")
-    limited = {"auto": unsaid, "true": "true", "false": "false"}
-    hinges_with_range = [joint for joint in bodies[0].iter("joint") if joint.get("range") is not None]
-    stopped = [joint.get("name", "joint") for joint in hinges_with_range if limited.get(joint.get("limited", "auto")) == "true"]
+    by_itself = _compiler(root, "autolimits", "true")
+    with_range = [joint for joint in bodies[0].iter("joint") if joint.get("range") is not None]
+    stopped = [
+        j.get("name", "joint") for j in with_range if (by_itself if j.get("limited", "auto") == "auto" else j.get("limited")) == "true"
+    ]
     return replace(found, model=found.model.replace(effects=(*rotors, *springs))).without_stops(stopped)
 
 
-def _angle(root: ET.Element) -> str:
+def _compiler(root: ET.Element, setting: str, default: str) -> str:
     compiler = root.find("compiler")
-    return compiler.get("angle", "degree") if compiler is not None else "degree"
+    return compiler.get(setting, default) if compiler is not None else default
 
 
 def _refuse_foreign(root: ET.Element) -> None:
