@@ -305,6 +305,22 @@ def test_a_struct_of_matlab_is_a_trial_as_a_group_of_hdf5_is(within: bool, recor
         assert np.abs(trial.q - r.q[: len(trial)]).max() <= 1e-12
 
 
+@pytest.mark.parametrize("within", ["struct", "array"])
+def test_structs_within_structs_of_matlab_are_trials_of_their_own(within: str, recording: Recording, tmp_path: Path) -> None:
+    """Of two arms below one condition the first was imported, and the other was left out in silence."""
+    from scipy.io import savemat
+
+    r = recording
+    fields = {"t": r.t, "q": r.q, "Fy": r.force_on_robot[:, 0], "Fz": r.force_on_robot[:, 1]}
+    cut = [{name: column[: len(column) - k] for name, column in fields.items()} for k in range(4)]
+    slow, fast = {"left": cut[0], "right": cut[1]}, {"left": cut[2], "right": cut[3]}
+    sessions = {"slow": slow, "fast": fast} if within == "struct" else {"conditions": np.array([slow, fast], dtype=object)}
+    savemat(tmp_path / "session.mat", sessions)
+    done = armrs.import_recordings([tmp_path / "session.mat"], tmp_path / "session", model=KNOWN)
+    found = armrs.load_dataset(done.folder).trials
+    assert sorted(len(r.t) - len(t) for t in found) == [0, 1, 2, 3]
+
+
 def test_the_offset_of_a_clock_is_found_to_a_thousandth_of_a_second(recording: Recording, tmp_path: Path) -> None:
     done = armrs.import_recordings(sorted(force_on_its_own_clock(recording, tmp_path).iterdir()), tmp_path / "session", model=KNOWN)
     (trial,) = done.recipe.trials

@@ -179,6 +179,7 @@ FOREIGN = [
     ('<body name="f"', '<attach model="m" body="b" prefix="p"/><body name="f"', "<body>: found <attach>"),
     ("</mujoco>", '<tendon><spatial stiffness="9"><site site="hand"/></spatial></tendon></mujoco>', "<tendon>: found <spatial>"),
     ("</mujoco>", '<tendon><fixed stiffness="1" damping="5"/></tendon></mujoco>', "<tendon>: found damping"),
+    ('diaginertia="0.01 0.01 0.01"', 'diaginertia="0.01 0.01 0.03"', "<body 'u'>: found principal moments of inertia 0.01, 0.01, 0.03 kg m²"),
 ]
 
 
@@ -194,6 +195,24 @@ def test_what_changes_the_arm_and_is_not_read_is_refused(old: str, new: str, wor
     path.write_text(chain.replace(old, new, 1))
     with pytest.raises(armrs.BadInput, match=re.escape(words)):
         armrs.import_model(path)
+
+
+@pytest.mark.parametrize("rest", [-1.0, 0.3])
+def test_the_spring_of_two_joints_rests_where_mujoco_takes_it_to(rest: float, tmp_path: Path) -> None:
+    """MuJoCo takes a length of -1, or none, for that at the rest angles of the joints; they were read as -1 and 0."""
+    mujoco = pytest.importorskip("mujoco")
+    spring = armrs.Effect("biarticular", 2, parameters={"stiffness": 2.0, "ratio": 0.8, "rest": rest})
+    model = armrs.Model(SEGMENTS, JOINTS, effects=(spring,))
+    path = armrs.export_model(model, tmp_path / "arm.xml").path
+    theirs = mujoco.MjModel.from_xml_path(str(path))
+    assert theirs.tendon_lengthspring[0, 0] == pytest.approx(rest, abs=1e-12)
+    assert armrs.import_model(path).effects[0].parameters["rest"] == pytest.approx(rest, abs=1e-12)
+    for absent in ("", ' springlength="-1"'):
+        at_rest = re.sub(r' springlength="[^"]*"', absent, path.read_text())
+        (tmp_path / "rest.xml").write_text(at_rest)
+        expected = mujoco.MjModel.from_xml_string(at_rest).tendon_lengthspring[0, 0]
+        assert expected == pytest.approx(0.04)
+        assert armrs.import_model(tmp_path / "rest.xml").effects[0].parameters["rest"] == pytest.approx(expected)
 
 
 def test_opensim_balances_the_exported_arm_as_we_do(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def simulate(
     dt: Step = None,
     accuracy_rad: Accuracy = None,
     rate_hz: Annotated[
-        float, typer.Option(help="Samples a second that are recorded [Hz], above 0; a whole number of steps from one to the next.")
+        float, typer.Option(help="Samples a second that are recorded [Hz], 0.001 or more; a whole number of steps from one to the next.")
     ] = 50.0,
     integrator: Annotated[
         Integrator | None, typer.Option(help="Of the native engine: fourth order, taken when absent, or semi-implicit first order.")

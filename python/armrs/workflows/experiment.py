@@ -436,18 +436,24 @@ def _settings(kind: Any, place: str, table: object) -> Any:
     return made
 
 
+_MOST = {
+    "force_noise_N": (100.0, "N"), "moment_noise_Nm": (100.0, "N m"), "brake_noise_Nm": (100.0, "N m"),
+    "marker_noise_m": (0.1, "m"), "marker_offset_m": (0.1, "m"), "clock_jitter_s": (1.0, "s"),
+}  # fmt: skip
+"""Of the deviations: far beyond any device, and small enough that what is recorded are forces and places."""
+
+
 def _devices(table: object) -> Devices:
     place = "[sensors]"
     made: Devices = _part_of(Devices, place, table)
     checks.whole(f"{place}, force_bits", made.force_bits, least=1, most=52)
     checks.flag(f"{place}, emg", made.emg)
     checks.number(f"{place}, rate_Hz", made.rate_Hz, least=10.0, most=1000.0, unit="Hz")
-    checks.number(f"{place}, force_range_N", made.force_range_N, above=0.0, unit="N")
+    checks.number(f"{place}, force_range_N", made.force_range_N, above=0.0, most=1e5, unit="N")
     checks.number(f"{place}, marker_gaps", made.marker_gaps, least=0.0, most=0.5)
-    for name in ("force_noise_N", "moment_noise_Nm", "marker_noise_m", "marker_offset_m", "brake_noise_Nm", "clock_jitter_s"):
-        if getattr(made, name) is None:
-            continue
-        checks.number(f"{place}, {name}", getattr(made, name), least=0.0)
+    for name, (most, unit) in _MOST.items():
+        if getattr(made, name) is not None:
+            checks.number(f"{place}, {name}", getattr(made, name), least=0.0, most=most, unit=unit)
     checks.number(f"{place}, clock_offset_s", made.clock_offset_s, least=-1.0, most=1.0, unit="s")
     checks.number(f"{place}, clock_drift", made.clock_drift, least=-0.01, most=0.01)
     return made

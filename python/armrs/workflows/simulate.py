@@ -29,6 +29,8 @@ CHATTER = 1e-5
 """Share of the energy exchanged that smooth friction loses when the step does not resolve it."""
 DEFAULT_RATE = 50.0
 """Samples a second of a recording [Hz]."""
+SLOWEST = 1e-3
+"""Least rate of a recording [Hz]."""
 RUNAWAY = 30.0
 """Speed of a joint beyond which a run is none of a led arm [rad/s]."""
 PIECE = 16384
@@ -81,7 +83,7 @@ class Sensors:
     torque: Channel = Channel()
 
     def __post_init__(self) -> None:
-        checks.number("rate", self.rate, above=0.0, unit="Hz")
+        checks.number("rate", self.rate, least=SLOWEST, unit="Hz")
         for kind in _CHANNELS:
             checks.instance(kind, getattr(self, kind), Channel)
 
@@ -346,7 +348,7 @@ def simulate(
         return _run(asked, accuracy, _seeded(sensors, seeds, rate))
 
     if accuracy is not None:
-        return run(1.0 / checks.number("rate", rate, above=0.0, unit="Hz"))
+        return run(1.0 / checks.number("rate", rate, least=SLOWEST, unit="Hz"))
     *shorter, last = steps_to_try(model, engine=engine, integrator=integrator, dt=dt)
     for step in shorter:
         with contextlib.suppress(SimulationError):  # a step that is too long may end the run
@@ -413,7 +415,7 @@ def resolve(
         As `simulate`.
     """
     _check_accuracy(accuracy, dt, engine, integrator)
-    step = 1.0 / checks.number("rate", rate, above=0.0, unit="Hz")
+    step = 1.0 / checks.number("rate", rate, least=SLOWEST, unit="Hz")
     asked = _asked(model, drive, engine=engine, integrator=integrator, dt=step, rate=rate, start=(None, None), **options)
     with asked.about_drive():
         chosen, error = _armrs.resolve(_armrs.Rig(model), asked.led, asked.core, accuracy)
@@ -480,8 +482,8 @@ def _asked(
     integrator = _integrator(integrator, engine)
     checks.instance("drive", drive, Movement, Trial, type(None))
     checks.number("dt", dt, above=0.0, unit="s")
-    checks.number("rate", rate, above=0.0, unit="Hz")
-    steps = 1.0 / max(rate * dt, 1e-18)  # what is next to zero is refused with the length of the run
+    checks.number("rate", rate, least=SLOWEST, unit="Hz")
+    steps = 1.0 / max(rate * dt, 1e-18)  # a step next to zero is refused with the length of the run
     if steps < 1.0 - 1e-6:
         raise BadInput("dt, rate", _clock(dt, rate), "at least one step from sample to sample")
     if abs(steps - round(steps)) > 1e-6 * steps:

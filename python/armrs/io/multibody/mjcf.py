@@ -21,6 +21,10 @@ _KNOWN_JOINT = {"name", "type", "axis", "pos", "stiffness", "springref", "dampin
 _KNOWN_TENDON = {"name", "group", "user", "stiffness", "springlength"}
 _KNOWN_IN_BODY = {"joint", "freejoint", "inertial", "geom", "site", "camera", "light", "body"}
 """What else stands in a body holds, makes or carries bodies: `frame`, `attach`, `replicate`, `composite`, `flexcomp`, `plugin`."""
+_AT_REST = -1.0
+"""The `springlength` that stands for the length at the rest angles of the joints, meant where none is stated."""
+_ROUNDED = 1e-6
+"""Share by which figures of a flat body, rounded in a file, may fail the rule that a moment of inertia is at most the sum of the others."""
 _EMPTY = ("default", "include", "equality", "actuator", "contact", "deformable", "extension")
 """Sections that change the arm as soon as they hold anything."""
 _NEUTRAL: dict[str, dict[str, tuple[str, ...]]] = {
@@ -58,7 +62,8 @@ def write(model: Model) -> Exported:
         tendon = ET.SubElement(root, "tendon")
         for e in springs:
             assert e.joint is not None
-            fixed = ET.SubElement(tendon, "fixed", stiffness=number(e.parameters["stiffness"]), springlength=number(e.parameters["rest"]))
+            rest = _spring_length(e.parameters["rest"])
+            fixed = ET.SubElement(tendon, "fixed", stiffness=number(e.parameters["stiffness"]), springlength=rest)
             ET.SubElement(fixed, "joint", joint=model.joints[e.joint - 2].name, coef=number(e.parameters["ratio"]))
             ET.SubElement(fixed, "joint", joint=model.joints[e.joint - 1].name, coef="1")
     lost = [*lost_effects([e for e in found.others if e not in springs]), *lost_robot(model)]
@@ -102,7 +107,7 @@ def read(text: str) -> Imported:
         body = inner[0]
     sites = body.findall("site")
     found = planar(hinges, turned @ _place(sites[-1]) if sites else None, -gravity[2])
-    springs = [_spring(fixed, [hinge.joint.name for hinge in hinges], found.zeros) for fixed in root.findall("tendon/fixed")]
+    springs = [_spring(fixed, [hinge.joint for hinge in hinges], found.zeros) for fixed in root.findall("tendon/fixed")]
     by_itself = _compiler(root, "autolimits", "true")
     with_range = [joint for joint in bodies[0].iter("joint") if joint.get("range") is not None]
     stopped = [
@@ -178,6 +183,10 @@ def _body(body: ET.Element, turned: np.ndarray) -> Body:
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     else:
         inertia = np.diag(vector(inertial, "diaginertia", 3))
+    principal = np.linalg.eigvalsh(inertia)
+    if 2.0 * principal[-1] > (1.0 + _ROUNDED) * principal.sum():
+        found = Text(f"principal moments of inertia {', '.join(f'{value:.4g}' for value in principal)} kg m²")
+        raise BadInput(f"<body {body.get('name')!r}>", found, "none greater than the sum of the others")
     about = turned @ _rotation(inertial)
     return Body(vector(inertial, "mass", 1)[0], turned @ _place(inertial), about @ inertia @ about.T)
 
@@ -202,14 +211,22 @@ def _joint(body: ET.Element, turn: float) -> tuple[Joint, np.ndarray, float]:
     return law, axis / np.linalg.norm(axis), rotor
 
 
-def _spring(fixed: ET.Element, names: list[str], zeros: Sequence[float]) -> Effect:
+def _spring_length(rest: float) -> str:
+    """Write the rest of a spring; what MuJoCo would take for the length at the rest angles, as the number next to it."""
+    return number(np.nextafter(rest, 0.0) if rest == _AT_REST else rest)
+
+
+def _spring(fixed: ET.Element, joints: list[Joint], zeros: Sequence[float]) -> Effect:
     """Return a spring over two joints, its rest in the angles of the arm."""
+    names = [joint.name for joint in joints]
     parts = [(p.get("joint"), vector(p, "coef", 1)[0]) for p in fixed.findall("joint")]
     if len(parts) == 2 and parts[1][0] in names and parts[0][0] in names:
         near, far = names.index(parts[0][0]), names.index(parts[1][0])
         if far == near + 1 and parts[1][1] == 1.0:
-            values = {"ratio": parts[0][1]}
-            rest = vector(fixed, "springlength", 1, (0.0,))[0] + (parts[0][1] * zeros[near] + zeros[far])
-            values |= {"stiffness": vector(fixed, "stiffness", 1, (0.0,))[0], "rest": rest}
+            ratio, length = parts[0][1], vector(fixed, "springlength", 1, (_AT_REST,))[0]
+            if length == _AT_REST:
+                length = ratio * joints[near].rest + joints[far].rest
+            rest = length + (ratio * zeros[near] + zeros[far])
+            values = {"ratio": ratio, "stiffness": vector(fixed, "stiffness", 1, (0.0,))[0], "rest": rest}
             return Effect("biarticular", far + 1, parameters=values)
     raise BadInput("<tendon> fixed", Text(str(parts)), "two joints one after the other, the far one with coef 1")

@@ -6,7 +6,6 @@ Damaged files crash both libraries, so that a process of its own reads them (`ap
 from __future__ import annotations
 
 import json
-from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +54,7 @@ def _version_5(path: Path) -> list[tuple[str, dict[str, np.ndarray]]]:
         for k, part in enumerate(structs, start=1):
             placed: dict[str, np.ndarray] = {}
             _collect("", part, placed, 0)
-            arrays: dict[str, np.ndarray] = {}
-            for place, value in placed.items():
-                arrays.setdefault(place.rsplit("/", 1)[-1], value)
-            titled.append((f"{path.stem} {k}", arrays))
+            titled += _tables(f"{path.stem} {k}", placed)
         return titled
     found: dict[str, np.ndarray] = {}
     for name, value in own.items():
@@ -101,19 +97,21 @@ def _unit_of(item: Any) -> str:
 
 def _tables(title: str, placed: dict[str, np.ndarray]) -> list[tuple[str, dict[str, np.ndarray]]]:
     """Return arrays by name; where groups or structs hold arrays of the same names, as those of trials do, each is a table."""
-    parts = [(name.split("/"), value) for name, value in placed.items()]
-    levels = zip(*(part[:-1] for part, _ in parts), strict=False)
-    shared = len(list(takewhile(lambda level: len(set(level)) == 1, levels)))
     whole: dict[str, np.ndarray] = {}
     together: dict[str, np.ndarray] = {}
     groups: dict[str, dict[str, np.ndarray]] = {}
-    for part, value in parts:
-        group = together if len(part) == shared + 1 else groups.setdefault(part[shared], {})
-        group.setdefault(part[-1], value)
-        whole.setdefault(part[-1], value)
-    if len(groups) > 1 and len(whole) < len(parts):
-        return [(f"{title} {group}", together | arrays) for group, arrays in groups.items()]
-    return [(title, whole)]
+    for place, value in placed.items():
+        whole.setdefault(place.rsplit("/", 1)[-1], value)
+        group, _, inside = place.partition("/")
+        if inside:
+            groups.setdefault(group, {})[inside] = value
+        else:
+            together[place] = value
+    if len(whole) == len(placed):
+        return [(title, whole)]
+    if len(groups) == 1:
+        return [table for inside in groups.values() for table in _tables(title, inside | together)]
+    return [table for group, inside in groups.items() for table in _tables(f"{title} {group}", together | inside)]
 
 
 def _placed(path: Path, units: dict[str, str]) -> dict[str, np.ndarray]:
