@@ -179,7 +179,11 @@ FOREIGN = [
     ('<body name="f"', '<attach model="m" body="b" prefix="p"/><body name="f"', "<body>: found <attach>"),
     ("</mujoco>", '<tendon><spatial stiffness="9"><site site="hand"/></spatial></tendon></mujoco>', "<tendon>: found <spatial>"),
     ("</mujoco>", '<tendon><fixed stiffness="1" damping="5"/></tendon></mujoco>', "<tendon>: found damping"),
-    ('diaginertia="0.01 0.01 0.01"', 'diaginertia="0.01 0.01 0.03"', "<body 'u'>: found principal moments of inertia 0.01, 0.01, 0.03 kg m²"),
+    (
+        'diaginertia="0.01 0.01 0.01"',
+        'diaginertia="0.01 0.01 0.03"',
+        "<body 'u'>: found principal moments of inertia 0.01, 0.01, 0.03 kg m²",
+    ),
 ]
 
 
