@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -319,6 +320,21 @@ def test_structs_within_structs_of_matlab_are_trials_of_their_own(within: str, r
     done = armrs.import_recordings([tmp_path / "session.mat"], tmp_path / "session", model=KNOWN)
     found = armrs.load_dataset(done.folder).trials
     assert sorted(len(r.t) - len(t) for t in found) == [0, 1, 2, 3]
+
+
+def test_a_whole_number_of_a_workbook_may_be_beyond_all_floats(recording: Recording, tmp_path: Path) -> None:
+    """It ended with a traceback."""
+    names, values = table(recording, names=SI)
+    values[7, 1] = 777777.0
+    path = _excel(tmp_path / "slow_1.xlsx", names, values)
+    with zipfile.ZipFile(path) as book:
+        parts = {name: book.read(name) for name in book.namelist()}
+    with zipfile.ZipFile(path, "w") as book:
+        for name, content in parts.items():
+            book.writestr(name, content.replace(b"777777", b"7" * 400))
+    done = armrs.import_recordings([path], tmp_path / "session", model=KNOWN)
+    (trial,) = armrs.load_dataset(done.folder).trials
+    assert np.abs(trial.q - recording.q).max() <= 1e-3, "the sample is bridged"
 
 
 def test_the_offset_of_a_clock_is_found_to_a_thousandth_of_a_second(recording: Recording, tmp_path: Path) -> None:

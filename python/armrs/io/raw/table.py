@@ -109,12 +109,12 @@ class RawTable:
 
 
 def column(name: str, values: np.ndarray, unit: str = "") -> RawColumn:
-    """Return a column; without `unit`, the unit is split off its name where one is recognised.
+    """Return a column; without `unit`, the unit is split off its name where one is recognised. What is infinite is missing.
 
     >>> [(one.label, one.unit) for one in (column(name, np.empty(0)) for name in ("Kraft / kN", "omega rad/s", "q1_deg", "Zeit [ms]"))]
     [('Kraft', 'kN'), ('omega', 'rad/s'), ('q1', 'deg'), ('Zeit', 'ms')]
     """
-    text = " ".join(name.split())
+    text, values = " ".join(name.split()), np.where(np.isinf(values), np.nan, values)
     if unit:
         return RawColumn(name, text, unit, values)
     if match := _IN_BRACKETS.match(text):

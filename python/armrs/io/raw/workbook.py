@@ -104,7 +104,10 @@ def _number(cell: Any) -> float:
     if isinstance(cell, bool) or cell is None:
         return np.nan
     if isinstance(cell, (int, float)):
-        return float(cell)
+        try:
+            return float(cell)
+        except OverflowError:  # a whole number of a workbook has any size
+            return np.inf
     if isinstance(cell, datetime.datetime):
         return (cell - _FIRST_DAY).total_seconds()
     if isinstance(cell, datetime.timedelta):
