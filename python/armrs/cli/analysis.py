@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import enum
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +12,7 @@ import typer
 
 from ..errors import BadInput, Text
 from ..report import console
-from .common import JsonFile, MaybeFolder, Source, command_line, present, writable
+from .common import JsonFile, MaybeFolder, Source, command_line, present, quoted, writable
 
 if TYPE_CHECKING:
     from ..io.dataset import Dataset
@@ -125,7 +124,7 @@ def identify(
         console.warn([*data.warnings, *result.warnings])
         if history is not None and not result.is_sound:
             console.warn([f"{history}: not added to the history, since the result is not sound"])
-        step = f"armrs gap {_quoted(dataset)} -o gap" if result.is_sound else f"armrs check {_quoted(dataset)}, and the warnings above"
+        step = f"armrs gap {quoted(dataset)} -o gap" if result.is_sound else f"armrs check {quoted(dataset)}, and the warnings above"
         present(lambda: plain, json, lambda: words.identified(plain, written), step)
     return 0 if result.is_sound else 1
 
@@ -181,14 +180,10 @@ def gap(
 
 def _after_gap(verdict: str, dataset: Path, folder: Path | None) -> str:
     if folder is None:
-        return f"armrs gap {_quoted(dataset)} -o gap writes a report with figures, and the amended model"
+        return f"armrs gap {quoted(dataset)} -o gap writes a report with figures, and the amended model"
     if verdict == "unexplained":
-        return f"{folder / 'report.html'} shows when and in which channel the gap is open; armrs check {_quoted(dataset)} asks the sensors"
-    return f"armrs report {_quoted(folder / 'gap.json')} --summary -o clinic writes one page in plain words"
-
-
-def _quoted(path: Path) -> str:
-    return shlex.quote(str(path))
+        return f"{folder / 'report.html'} shows when and in which channel the gap is open; armrs check {quoted(dataset)} asks the sensors"
+    return f"armrs report {quoted(folder / 'gap.json')} --summary -o clinic writes one page in plain words"
 
 
 def passive(

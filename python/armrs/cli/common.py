@@ -83,6 +83,11 @@ def present(data: Callable[[], Any], to: Path | None, human: Callable[[], None],
         print(f"Next: {step}")
 
 
+def quoted(path: Path) -> str:
+    """Return a path as a shell takes it."""
+    return shlex.quote(str(path))
+
+
 def writable(out: Path | None, json: Path | None = None, *, verb: str | None = None) -> Path | None:
     """Refuse outputs that cannot be written before any work is done, and a folder with the report of another verb."""
     if json is not None and json != _STDOUT:

@@ -13,7 +13,7 @@ import typer
 
 from ..errors import BadInput, Text
 from ..report import console
-from .common import JsonFile, MaybeFolder, OutFolder, SamplesFormat, command_line, listed, present, samples_suffix, writable
+from .common import JsonFile, MaybeFolder, OutFolder, SamplesFormat, command_line, listed, present, quoted, samples_suffix, writable
 
 if TYPE_CHECKING:
     from ..io.trial import Reading
@@ -240,7 +240,12 @@ def record(
     plain = result.to_dict() | {"made_by": origin(command_line(context))}
     report = write_recorded(result, plain, out)[-1]
     console.warn(sticking_said(planned.truth))
-    present(lambda: plain, json, lambda: words.recorded(plain, report))
+    apart = (
+        ""
+        if any(run.tests for run in planned.runs)
+        else "; tests = 1 in [[movement]] records a trial that is kept apart to test the result on"
+    )
+    present(lambda: plain, json, lambda: words.recorded(plain, report), f"armrs gap {quoted(out)} -o gap{apart}")
     return 1 if result.stopped else 0
 
 
