@@ -110,6 +110,10 @@ def test_the_gap_is_closed_from_the_calibrated_base(score: ModuleType) -> None:
     unknown = {"before": None, "calibrated": None, "after": None, "floor": None}
     assert score.closure({"Fy_N": channel, "Fz_N": at_floor, "q1_rad": unknown}) == pytest.approx(0.9)
     assert score.closure({"Fz_N": at_floor}) is None
+    # What lies above a floor by less than that is uncertain does not count either.
+    uncertain = {"before": 9.0, "calibrated": 1.4, "after": 1.4, "floor": 1.0, "floor_std": 0.5}
+    assert score.closure({"Fy_N": channel, "Fz_N": uncertain}) == pytest.approx(0.9)
+    assert score.closure({"Fy_N": channel, "Fz_N": uncertain | {"floor_std": 0.3}}) == pytest.approx(0.9 / 1.4)
     # Channels of other units count by their floors: (0.9 + 0) / (1 + 1).
     stays = {"before": 0.02, "calibrated": 0.002, "after": 0.002, "floor": 0.001}
     assert score.closure({"Fy_N": channel, "q1_rad": stays}) == pytest.approx(0.45)

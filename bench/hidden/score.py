@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 CHANNEL_ABOVE_FLOOR = 1.1
-"""A channel counts for the gap where the calibrated base is this much above the floor."""
+"""A channel counts for the gap where the calibrated base is this much above the floor, and by more than the floor is uncertain (`floor_std`)."""
 CLOSED = 0.9
 """Part of the gap that is to be closed where the naming is right."""
 OPEN = 1.5
@@ -100,7 +100,9 @@ def closure(gap: Json) -> float | None:
     closed = above = 0.0
     for channel in gap.values():
         calibrated, after, floor = (channel.get(key) for key in ("calibrated", "after", "floor"))
-        if calibrated is None or after is None or not floor or calibrated <= CHANNEL_ABOVE_FLOOR * floor:
+        if calibrated is None or after is None or not floor:
+            continue
+        if calibrated <= max(CHANNEL_ABOVE_FLOOR * floor, floor + (channel.get("floor_std") or 0.0)):
             continue
         closed += (calibrated - after) / floor
         above += (calibrated - floor) / floor
