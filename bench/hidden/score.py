@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 CHANNEL_ABOVE_FLOOR = 1.1
-"""A channel counts for the gap where the calibrated base is this much above the floor, and by more than the floor is uncertain (`floor_std`)."""
+"""A channel counts for the gap where the calibrated base is this much above the floor, and by more than that is uncertain (`floor_std`)."""
 CLOSED = 0.9
 """Part of the gap that is to be closed where the naming is right."""
 OPEN = 1.5
