@@ -93,8 +93,8 @@ def _identified(result: Mapping[str, Any]) -> str:
     if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
         ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
     return (
-        f"The movements determine {result['rank']} of {result['unknowns']} unknowns. "
-        f"Of the {len(by)} parameters listed, {', '.join(counts)}.{ending}"
+        f"The movements determine {result['rank']} independent combinations of the {result['unknowns']} unknowns. "
+        f"Of the {len(by)} parameters that follow from these and from the model as given, {', '.join(counts)}.{ending}"
     )
 
 
