@@ -191,6 +191,15 @@ def test_what_swings_with_the_same_phase_in_every_trial_is_seen(
         assert np.nanstd(line[f"without {kind.replace('_', ' ')}"] - line["with the named effects"]) > 0.0
 
 
+def test_a_slow_swing_is_seen_beside_a_fast_one() -> None:
+    """Once the tremor was set apart, nobody asked for what swings slowly; both begin alike in every trial."""
+    tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.15, "frequency": 6.1, "phase": 0.7})
+    heave = armrs.Effect("shoulder_heave", parameters={"y": -3e-3, "z": 9e-3, "frequency": 0.31, "phase": 0.7})
+    result = armrs.find_gap(session(tremor, heave, engine="native"), threads=2, separate=False)
+    assert {(e.kind, e.joint) for e in result.effects} == {("tremor", 2), ("shoulder_heave", None)}
+    assert result.verdict == "explained"
+
+
 def test_a_rhythm_that_a_strong_effect_hides_is_seen_once_that_is_named() -> None:
     spring = armrs.Effect("elastic", 1, parameters={"stiffness": 4.0, "rest": -0.3})
     tremor = armrs.Effect("tremor", 2, parameters={"amplitude": 0.1, "frequency": 4.4})

@@ -62,7 +62,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 all.rhythm_asked_again(state, apart, progress)
             })?;
             state = self.or_as_it_was(state, &mut apart, |all, state, apart| {
-                all.rhythm_in_phase(state, apart, progress)
+                all.rhythms_in_phase(state, apart, progress)
             })?;
         }
         state = self.or_as_it_was(state, &mut apart, Self::disturbances_asked_again)?;

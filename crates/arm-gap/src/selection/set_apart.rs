@@ -93,12 +93,30 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Looks for what swings in phase in all trials, which repeats do not differ by, in what is left, and searches once more beside it.
-    pub(crate) fn rhythm_in_phase(
+    ///
+    /// A fast swing may hide a slow one, and a slow one a fast one.
+    pub(crate) fn rhythms_in_phase(
         &mut self,
-        state: SearchState<'a, N>,
+        mut state: SearchState<'a, N>,
         apart: &mut SetApart<N>,
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
+        for _ in 0..2 {
+            if !self.sets_apart_in_phase(&state, apart)? {
+                break;
+            }
+            let again = self.calibrate_anew()?;
+            state = self.search_from(again, apart.periodic, progress)?;
+        }
+        Ok(state)
+    }
+
+    /// Sets one swing in phase apart; whether there is one. Only one slow swing is asked for.
+    fn sets_apart_in_phase(
+        &mut self,
+        state: &SearchState<'a, N>,
+        apart: &mut SetApart<N>,
+    ) -> Result<bool, GapError> {
         let mut found = None;
         for line in [Line::OfTheRobot, Line::InPhase] {
             let is_new = |f: &TrialSpecific| {
@@ -111,19 +129,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 found = self.rhythm(&state.point, line)?.filter(is_new);
             }
         }
-        apart.periodic = match &found {
-            Some(found) => Some(found.wave()).filter(|[frequency, _]| *frequency < SLOW),
-            None => self.in_phase((&state.current, &state.point), state.scale),
-        };
-        if found.is_none() && apart.periodic.is_none() {
-            return Ok(state);
+        match found {
+            Some(fast) if fast.wave()[0] >= SLOW => {
+                self.take_out(&state.point, &fast)?;
+                apart.trial_specific.push(fast);
+                Ok(true)
+            }
+            _ if apart.periodic.is_some() => Ok(false),
+            slow => {
+                apart.periodic = match slow {
+                    Some(slow) => Some(slow.wave()),
+                    None => self.in_phase((&state.current, &state.point), state.scale),
+                };
+                Ok(apart.periodic.is_some())
+            }
         }
-        if let (Some(found), None) = (&found, apart.periodic) {
-            self.take_out(&state.point, found)?;
-            apart.trial_specific.push(found.clone());
-        }
-        let again = self.calibrate_anew()?;
-        self.search_from(again, apart.periodic, progress)
     }
 
     /// Asks for disturbances of single trials once more when something was named: what looked like one may have been that.

@@ -19,10 +19,15 @@ const LEAST_TURNS: f64 = 1.5;
 const TURNS: f64 = 0.7;
 /// Most frequencies that are asked: of trials so long that these are not enough a line in the spectrum tells as much.
 const MOST: usize = 120;
+/// [`UNSTEADY`] where joints have dry friction: a swing that turns them over changes what friction does, which no linear response knows.
+/// Movements have nothing else in common: what is no swing differs in most of its square.
+const UNSTEADY_IF_DRY: f64 = 0.3;
 /// Frequencies asked at a time: products of all their columns are kept.
 const AT_ONCE: usize = 8;
 /// Frequencies asked to either side of the best one, and between it and the next.
 const CLOSER: i32 = 5;
+/// Times that this is done, each time closer: a wave whose phase runs away over a trial is not alike in trials of other lengths.
+const LOOKS: i32 = 2;
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// Frequency \[Hz\] and phase \[rad\] of what swings slowly, is plain in all movements together, and alike in each; `None` where there
@@ -47,11 +52,24 @@ impl<const N: usize> PreparedSession<'_, N> {
         for frequencies in coarse.chunks(AT_ONCE) {
             best = better(best, self.waves_at(frequencies, (fitted, point)));
         }
-        let (_, [near, _]) = best?;
-        let closer = |k: i32| near + step * f64::from(k) / f64::from(CLOSER + 1);
-        let closer: Vec<f64> = (-CLOSER..=CLOSER).map(closer).collect();
-        let (_, wave) = better(best, self.waves_at(&closer, (fitted, point)))?;
+        // Between two frequencies that were asked a wave gains at most twice as much.
+        best = best.filter(|(gain, _)| gain / scale.max(1.0) > libm::log(count as f64));
+        let mut apart = step;
+        for _ in 0..LOOKS {
+            let (_, [near, _]) = best?;
+            apart /= f64::from(CLOSER + 1);
+            let closer: Vec<f64> = (-CLOSER..=CLOSER)
+                .map(|k| near + apart * f64::from(k))
+                .collect();
+            best = better(best, self.waves_at(&closer, (fitted, point)));
+        }
+        let (_, wave) = best?;
         let (library, score_test) = self.scanned(&[wave], (fitted, point))?;
+        let unsteady = if self.dry.contains(&true) {
+            UNSTEADY_IF_DRY
+        } else {
+            UNSTEADY
+        };
         let is_plain = |c: usize| {
             let Some(choice) = score_test.evaluate(&[c]) else {
                 return false;
@@ -60,7 +78,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 2.0 * libm::log(count as f64) + self.price_of_shapes(&library.candidates[c..=c]);
             let worth =
                 choice.gain / scale.max(1.0) - score_test.spread[c] * score_test.price[c] - tried;
-            worth > 0.0 && score_test.unlike[c] < UNSTEADY * choice.gain
+            worth > 0.0 && score_test.unlike[c] < unsteady * choice.gain
         };
         (0..score_test.len()).any(is_plain).then_some(wave)
     }
