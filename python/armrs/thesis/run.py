@@ -83,8 +83,8 @@ def _draw(found: Found, out: Path, virtual: bool) -> list[Path]:
         files.may_replace(path, ".png")
         if virtual:
             _stamp(drawn.figure)
-        with plotting.style(), files.replacing(path) as temporary:
-            drawn.figure.savefig(temporary, format="png", dpi=110)
+        with files.replacing(path) as temporary:
+            plotting.write_png(drawn.figure, temporary)
         paths.append(path)
     return paths
 
