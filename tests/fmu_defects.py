@@ -206,6 +206,7 @@ BOTH: dict[str, tuple[Change, str]] = {
     "derivative of no variable": (edit(r' derivative="\d+"', ' derivative="9999"'), "9999"),
     "derivative not said": (edit(r' derivative="\d+"', ""), "has no attribute derivative"),
     "output not listed": (edit(r"(?s)(<ModelStructure>(?:\s*<Outputs>)?)\s*<(?:Output|Unknown) [^>]*/>\n", r"\1"), "is not listed"),
+    "unknown encoding": (edit('encoding="UTF-8"', 'encoding="UTF-1"'), "unknown encoding"),
     "document type": (edit("<fmiModelDescription", '<!DOCTYPE x [<!ENTITY a "a">]>\n<fmiModelDescription'), "a document type"),
     "XML that does not end": (edit("</fmiModelDescription>", ""), "XML"),
     "version that is unknown": (edit('fmiVersion="[23].0"', 'fmiVersion="4.0"'), "4.0"),

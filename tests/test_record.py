@@ -182,6 +182,11 @@ def test_a_fault_stops_the_trial(experiment: Path, tmp_path: Path, fault: str, r
         ("moment_Nm = [0.05, 0.02]", "moment_Nm = [nan, 0.02]", r"\[variation\], moment_Nm: found nan"),
         ("marker_gaps = 0.01", "marker_gaps = 2", r"\[sensors\], marker_gaps: found 2\.0, allowed a finite number 0 to 0\.5"),
         ("emg = true", "force_noise_N = 1e300", r"\[sensors\], force_noise_N: found 1e\+300, allowed a finite number 0 to 100 N"),
+        (
+            "acceleration_rad_s2 = 2.0",
+            "acceleration_rad_s2 = 1e-9",
+            r"\[\[movement\]\] 1 \(slow\): found .* s and more, allowed at most 3600 s",
+        ),
         ("repeats = 2", "repeats = 0", r"\[\[movement\]\]: found no repeats"),
         (
             'configuration = "slow"',

@@ -275,6 +275,7 @@ def test_systems_within_systems_mappings_and_transformations(folder: Path) -> No
             "SignalDictionaryReference",
         ),
         ("<?xml", "<!DOCTYPE a><?xml", "a document type"),
+        ('encoding="UTF-8"', 'encoding="UTF-1"', "unknown encoding"),
     ],
 )
 def test_what_is_not_taken_is_named(folder: Path, old: str, new: str, words: str) -> None:

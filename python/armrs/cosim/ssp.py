@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 from .. import checks
 from ..errors import BadInput, Text
-from ..fmu.archive import archive, refuse_xml, unpack
+from ..fmu.archive import archive, refuse_xml, unpack, xml_root
 from .isolated import IsolatedSlave
 from .partner import Partner
 from .system import System, couple
@@ -378,9 +378,9 @@ def _xml(path: Path, prefix: str, tag: str) -> ElementTree.Element:
         raise BadInput("file", Text(error.strerror or "unreadable"), "a file that can be read", file=path) from None
     refuse_xml(path.name, content, path)
     try:
-        root = ElementTree.fromstring(content)
-    except ElementTree.ParseError as error:
-        raise BadInput("XML", Text(str(error)), "XML", file=path) from None
+        root = xml_root("XML", content)
+    except BadInput as error:
+        raise error.within(file=path) from None
     if root.tag != f"{{{NAMESPACES[prefix]}}}{tag}":
         raise BadInput("root", root.tag, f"{prefix}:{tag} of SSP 1.0", file=path)
     return root

@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from xml.etree import ElementTree
 
 from .. import checks
 from ..errors import BadInput, Text
@@ -20,6 +21,8 @@ MOST_BYTES = 1 << 30
 """Most bytes that are unpacked."""
 MOST_FILES = 100_000
 _PIECE = 1 << 20
+_MOST_SAID = 200
+"""Letters of what the parser says, which may repeat what it read."""
 
 
 @contextmanager
@@ -79,6 +82,14 @@ def refuse_xml(name: str, content: bytes, path: str | os.PathLike[str]) -> None:
         raise BadInput(name, Text("UTF-16 or UTF-32"), "UTF-8", file=path)
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
         raise BadInput(name, Text("a document type"), "XML without one", file=path)
+
+
+def xml_root(name: str, content: bytes) -> ElementTree.Element:
+    """Return the root element of an XML file; what is none is refused, without the name of the archive."""
+    try:
+        return ElementTree.fromstring(content)
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two for an encoding that is none
+        raise BadInput(name, Text(str(error)[:_MOST_SAID]), "XML") from None
 
 
 def unpack(path: str | os.PathLike[str], folder: Path) -> None:

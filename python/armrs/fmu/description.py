@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from ..cosim.partner import Variable
 from ..errors import BadInput, Text
-from .archive import DESCRIPTION, archive, read_xml
+from .archive import DESCRIPTION, archive, read_xml, xml_root
 
 BASE_UNITS = ("kg", "m", "s", "rad")
 _OTHER_UNITS = ("A", "K", "mol", "cd")
@@ -126,10 +126,7 @@ def read_description(path: str | os.PathLike[str]) -> Description:
 
 def parse(content: bytes) -> Description:
     """Read a model description from its bytes."""
-    try:
-        root = ElementTree.fromstring(content)
-    except ElementTree.ParseError as error:
-        raise BadInput(DESCRIPTION, Text(str(error)), "XML") from None
+    root = xml_root(DESCRIPTION, content)
     version = root.get("fmiVersion", "")
     if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
         raise BadInput(f"{DESCRIPTION}, fmiVersion", version or Text("none"), "2.0 or 3.0")

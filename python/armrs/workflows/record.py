@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 RECORDING_RATE = 500.0
 """Samples a second of the simulation, from which the devices take theirs [Hz]."""
+LONGEST = 3600.0
+"""Of a trial [s]: nobody holds still for longer, and what is recorded would fill the memory."""
 GAP = 0.1
 """Length of a gap of a hidden marker [s]."""
 EMG_REST, EMG_GAIN = 3.0, 20.0
@@ -186,6 +188,9 @@ def check_required(experiment: Experiment) -> None:
     safety = experiment.safety
     for number, run in enumerate(experiment.runs, start=1):
         place = f"[[movement]] {number} ({run.configuration})"
+        if (least := _least_duration(run.movement)) > LONGEST:
+            hint = "a larger speed or acceleration"
+            raise BadInput(place, Text(f"{least:.4g} s and more"), f"at most {LONGEST:g} s", file=experiment.file, hint=hint)
         try:
             asked = simulate(experiment.truth, run.movement, rate=RECORDING_RATE).columns
         except BadInput as error:
@@ -196,6 +201,13 @@ def check_required(experiment: Experiment) -> None:
                 found = Text(f"{most:.3g} {unit} of a joint of the robot")
                 hint = "slower, or away from where the robot is stretched out"
                 raise BadInput(place, found, f"at most [safety] {name} = {allowed:g}", file=experiment.file, hint=hint)
+
+
+def _least_duration(movement: Movement) -> float:
+    """Return what a movement lasts at least, whatever its shape [s]."""
+    ways = np.abs(np.diff(movement.waypoints, axis=0)).max(axis=1)
+    moving = np.maximum(ways / movement.speed, 2.0 * np.sqrt(ways / movement.acceleration))
+    return float(moving.sum()) + movement.pause * (len(ways) - 1)
 
 
 @dataclass(frozen=True, eq=False)
