@@ -162,6 +162,37 @@ def test_refuses_a_broken_trc(good: Path, old: str, new: str, message: str) -> N
         armrs.read_markers(good)
 
 
+def test_a_marker_at_zero_in_some_samples_was_not_seen_there(tmp_path: Path) -> None:
+    """It was taken for a place: status 0, and angles of 180 degrees."""
+    _, positions, *_ = planar_arm(30)
+    seen = armrs.planar_motion(armrs.read_markers(trc(tmp_path / "seen.trc", positions)), ["S", "E", "H"], up="z")
+    lost = positions.copy()
+    lost[7:9, 2] = 0.0
+    found = armrs.planar_motion(armrs.read_markers(trc(tmp_path / "lost.trc", lost)), ["S", "E", "H"], up="z")
+    assert np.flatnonzero(np.isnan(found.q[:, 1])).tolist() == [7, 8]
+    assert found.lengths == pytest.approx(seen.lengths, abs=1e-9)
+    assert any("markers are missing in 6.7 %" in line for line in found.warnings())
+    lost[:, 2] = 0.0
+    with pytest.raises(BadInput, match="points: found H at 0 0 0 in all samples"):
+        armrs.planar_motion(armrs.read_markers(trc(tmp_path / "lost.trc", lost)), ["S", "E", "H"], up="z")
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_lengths_that_no_arm_has_are_refused(factor: float, tmp_path: Path) -> None:
+    """Millimetres that were called metres, or metres that were called millimetres."""
+    path = trc(tmp_path / "unit.trc", factor * planar_arm(30)[1])
+    with pytest.raises(BadInput, match=r"m from S to E, allowed 0.005 to 10 m \(is the unit of the file right\?\)"):
+        armrs.planar_motion(armrs.read_markers(path), ["S", "E", "H"], up="z")
+
+
+def test_a_name_that_a_file_has_twice_and_a_wrong_count_of_markers_are_told(tmp_path: Path) -> None:
+    path = trc(tmp_path / "twice.trc", planar_arm(30)[1], names=("S", "E", "E"))
+    with pytest.raises(BadInput, match="points: found 'E', allowed a name that the file has once, not 2 times"):
+        armrs.planar_motion(armrs.read_markers(path), ["S", "E"])
+    path.write_text(path.read_text().replace("\t30\t3\tmm", "\t30\t5\tmm"))
+    assert "the header announces 5 markers, 3 are there" in armrs.read_markers(path).warnings
+
+
 @pytest.mark.parametrize(
     ("points", "options", "message"),
     [
@@ -233,6 +264,8 @@ def test_refuses_broken_motions(tmp_path: Path) -> None:
         ("0.1\t", "0.0\t", "line 9, time: found 0 s twice"),
         ("nColumns=2", "nColumns=3", "file: found 2 columns, allowed 3 columns, as its header says"),
         ("nRows=2", "nRows=3", "file: found 2 rows, allowed 3 rows, as its header says"),
+        ("version=1", "inDegrees=no", "header, indegrees: found no and yes, allowed one of them"),
+        ("nRows=2", "nRows=1", r"file: found 2 rows, allowed 1 rows, as its header says$"),
         ("version=1", "datacolumns 12", "file: found 2 columns, allowed 12 columns, as its header says"),
     ]
     for old, new, message in cases:
@@ -242,6 +275,9 @@ def test_refuses_broken_motions(tmp_path: Path) -> None:
             armrs.convert_motion(tmp_path / "m.mot", tmp_path / "out", to="csv")
     (tmp_path / "m.mot").write_text(good.replace("inDegrees=yes\n", ""))
     with pytest.raises(BadInput, match="found no inDegrees"):
+        armrs.convert_motion(tmp_path / "m.mot", tmp_path / "out", to="csv", coordinates=["q"])
+    (tmp_path / "m.mot").write_text(good.replace("=yes", "=no").replace("2.0", "60.0"))
+    with pytest.raises(BadInput, match=r"header: found inDegrees=no and an angle of 60, allowed .* \(looks like degrees\)"):
         armrs.convert_motion(tmp_path / "m.mot", tmp_path / "out", to="csv", coordinates=["q"])
     assert not (tmp_path / "out").exists()
 

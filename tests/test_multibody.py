@@ -160,6 +160,16 @@ def edited(change: Callable[[str], str]) -> Callable[[Path], Path]:
         (lambda s: s.replace("<robot", "<sdf", 1).replace("</robot", "</sdf"), "<robot>"),
         (lambda s: s.replace('value="2.114"', 'value="heavy"'), "finite number"),
         (lambda s: s[: len(s) // 2], "well-formed"),
+        (lambda s: s.replace('<axis xyz="1 0 0"', '<axis xyz="0 0 1" /><axis xyz="1 0 0"', 1), "<axis>: found 2 of them"),
+        (lambda s: s.replace("<origin ", '<origin quat_xyzw="1 0 0 0" ', 1), "<origin>: found quat_xyzw"),
+        (
+            lambda s: s.replace("</robot>", '<gazebo reference="elbow"><springStiffness>10</springStiffness></gazebo></robot>'),
+            "<gazebo 'elbow'> <springStiffness>: found '10', allowed 0",
+        ),
+        (
+            lambda s: s.replace("</robot>", '<gazebo reference="fore"><gravity>0</gravity></gazebo></robot>'),
+            "<gazebo 'fore'> <gravity>: found '0', allowed true",
+        ),
     ],
 )
 def test_a_chain_that_is_not_planar_is_refused_by_name(change: Callable[[str], str], words: str, tmp_path: Path) -> None:

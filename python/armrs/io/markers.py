@@ -22,6 +22,8 @@ METRES = {"mm": 1e-3, "m": 1.0, "cm": 1e-2}
 MARKER_SUFFIXES = (".c3d", ".trc")
 PLANAR = math.radians(5.0)
 """Root mean square angle between segments and plane up to which a movement counts as planar [rad]."""
+_SEGMENT = (0.005, 10.0)
+"""Mean length of a segment of any arm [m]."""
 _LEAST_SPREAD = 1e-3
 """Segments that turn less than this, relative to their length, do not span a plane."""
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -60,15 +62,25 @@ class Markers:
             object.__setattr__(self, name, value)
 
     def point(self, text: str) -> np.ndarray:
-        """Return the trajectory of a marker, or of the mean of several written `A+B`, shape (n, 3) [m]; NaN where any is missing."""
-        return np.mean([self.positions[:, self._index(part.strip())] for part in text.split("+")], axis=0)
+        """Return the trajectory of a marker, or of the mean of several written `A+B`, shape (n, 3) [m]; NaN where any is missing.
+
+        Many programs write a marker that is not seen at exactly 0 0 0: one that is elsewhere in other samples is missing there.
+        """
+        return np.mean([self._seen(part.strip()) for part in text.split("+")], axis=0)
+
+    def _seen(self, name: str) -> np.ndarray:
+        at = self.positions[:, self._index(name)]
+        lost = (at == 0.0).all(axis=1)
+        return at if lost.all() else np.where(lost[:, None], np.nan, at)
 
     def _index(self, name: str) -> int:
         found = [k for k, label in enumerate(self.names) if name in (label, label.rpartition(":")[2])]
         if not found:
             raise unknown_name("points", name, [label.rpartition(":")[2] for label in self.names], what="marker")
         if len(found) > 1:
-            raise BadInput("points", name, f"one of {', '.join(self.names[k] for k in found)}")
+            labels = list(dict.fromkeys(self.names[k] for k in found))
+            allowed = f"one of {', '.join(labels)}" if len(labels) > 1 else f"a name that the file has once, not {len(found)} times"
+            raise BadInput("points", name, allowed)
         return found[0]
 
 
@@ -187,6 +199,18 @@ def markers_of(content: c3d.C3D) -> Markers:
     return Markers(content.labels, np.arange(len(content.points)) / content.rate, METRES[content.unit] * content.points, up="z")
 
 
+def _check_places(points: Sequence[str], at: np.ndarray, lengths: np.ndarray) -> None:
+    """Refuse points, (n, k, 3), that were never seen or are no joints of an arm; lengths of the segments (samples, k - 1) [m]."""
+    if lengths.min() < 1e-6:
+        raise BadInput("points", Text("two neighbours at one place"), "points that lie apart")
+    for k, length in enumerate(lengths.mean(axis=0), start=1):
+        if not at[:, k].any():
+            raise BadInput("points", Text(f"{points[k]} at 0 0 0 in all samples"), "markers that were seen")
+        if not _SEGMENT[0] <= length <= _SEGMENT[1]:
+            found = Text(f"{length:.3g} m from {points[k - 1]} to {points[k]}")
+            raise BadInput("points", found, f"{_SEGMENT[0]:g} to {_SEGMENT[1]:g} m", hint="is the unit of the file right?")
+
+
 def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = None, forward: str | None = None) -> PlanarMotion:
     """Turn marker trajectories into joint angles and segment lengths of a planar arm.
 
@@ -224,8 +248,7 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
     segments = np.diff(at, axis=1)
     distances = np.linalg.norm(segments, axis=2)
     seen, lengths = segments[there], distances[there]
-    if lengths.min() < 1e-6:
-        raise BadInput("points", Text("two neighbours at one place"), "points that lie apart")
+    _check_places(points, at, lengths)
     scatter = np.einsum("nki,nkj->ij", seen, seen) / seen.shape[0]
     spread, axes = np.linalg.eigh(scatter)
     if np.sqrt(max(spread[1], 0.0) / spread[2]) < _LEAST_SPREAD:

@@ -12,6 +12,7 @@ import numpy as np
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from . import files
+from .columns import ANGLE
 from .conversion import read_table
 from .markers import MARKER_SUFFIXES, Markers, PlanarMotion, planar_motion, read_c3d
 from .opensim import MOTION_SUFFIXES, Motion, read_motion, read_trc, write_motion
@@ -126,7 +127,11 @@ def _angles(motion: Motion, coordinates: Sequence[str]) -> Motion:
         raise BadInput("header", Text("no inDegrees"), "inDegrees=yes or inDegrees=no", hint="the unit of the angles is not known")
     unit = "deg" if motion.in_degrees else "rad"
     names = [f"q{j}_{unit}" for j in range(1, len(coordinates) + 1)]
-    return Motion(names, motion.t, motion.values[:, [motion.names.index(name) for name in coordinates]], motion.in_degrees)
+    values = motion.values[:, [motion.names.index(name) for name in coordinates]]
+    most = float(np.nanmax(np.abs(values), initial=0.0))
+    if not motion.in_degrees and most > ANGLE.most:
+        raise BadInput("header", Text(f"inDegrees=no and an angle of {most:.4g}"), f"angles up to {ANGLE.most:.3g} rad", hint=ANGLE.hint)
+    return Motion(names, motion.t, values, motion.in_degrees)
 
 
 def _table_motion(path: Path) -> Motion:

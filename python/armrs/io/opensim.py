@@ -42,6 +42,10 @@ class Motion:
     in_degrees: bool | None
 
 
+_KEYS = {"nrows", "datarows", "ncolumns", "datacolumns", "indegrees"}
+"""Keys of a header that are read."""
+
+
 def read_motion(path: Path) -> Motion:
     """Read a MOT or STO file.
 
@@ -72,7 +76,8 @@ def read_motion(path: Path) -> Motion:
     for keys, count, what in ((("nrows", "datarows"), len(table), "rows"), (("ncolumns", "datacolumns"), len(names), "columns")):
         for key in keys:
             if key in header and header[key] != str(count):
-                hint = "the file is cut off" if what == "rows" else None
+                short = what == "rows" and header[key].isdecimal() and count < int(header[key][:18])
+                hint = "the file is cut off" if short else None
                 raise BadInput("file", Text(f"{count} {what}"), f"{header[key] or 'no'} {what}, as its header says", hint=hint)
     _increasing(table[:, 0], [k for k, _ in rows])
     return Motion(names[1:], table[:, 0], table[:, 1:], _in_degrees(header, lines[:end]))
@@ -119,9 +124,11 @@ def read_trc(path: Path) -> Markers:
     _increasing(table[:, 1], [k for k, _ in rows])
     _same_rate(header.get("datarate", ""), table[:, 1])
     announced = header.get("numframes", "")
-    notes = () if announced == str(len(table)) else (f"the header announces {announced or 'no'} frames, {len(table)} are there",)
+    notes = [] if announced == str(len(table)) else [f"the header announces {announced or 'no'} frames, {len(table)} are there"]
+    if (markers := header.get("nummarkers", str(len(names)))) != str(len(names)):
+        notes.append(f"the header announces {markers} markers, {len(names)} are there")
     positions = METRES[unit] * table[:, 2:].reshape(len(table), len(names), 3)
-    return Markers(names, table[:, 1], positions, up="y", warnings=notes)
+    return Markers(names, table[:, 1], positions, up="y", warnings=tuple(notes))
 
 
 def write_trc(path: Path, markers: Markers) -> Path:
@@ -156,7 +163,12 @@ def _lines(path: Path) -> list[str]:
 def _header(lines: Sequence[str]) -> dict[str, str]:
     """Return the keys of a header, old (`datarows 121`) and new (`nRows=121`)."""
     pairs = [line.partition("=")[::2] if "=" in line else [*line.split(None, 1), "", ""][:2] for line in lines]
-    return {key.strip().lower(): value.strip() for key, value in pairs}
+    found: dict[str, str] = {}
+    for key, value in ((key.strip().lower(), value.strip()) for key, value in pairs):
+        if key in _KEYS and found.get(key, value) != value:
+            raise BadInput(f"header, {key}", Text(f"{found[key]} and {value}"), "one of them")
+        found[key] = value
+    return found
 
 
 def _in_degrees(header: dict[str, str], lines: Sequence[str]) -> bool | None:

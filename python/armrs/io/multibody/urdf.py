@@ -16,6 +16,10 @@ from .joints import Exported, document, laws, lost_effects, lost_robot, number, 
 
 _ROOT = "ground"
 _TIP = "hand_tip"
+_ONCE = ("origin", "axis", "inertial", "mass", "inertia", "dynamics", "parent", "child")
+_NEUTRAL = {
+    "springStiffness": ("0", "0.0"), "gravity": ("true", "1"), "turnGravityOff": ("false", "0")}  # fmt: skip
+"""What Gazebo adds to joints and links that changes the arm -> values with which it changes nothing."""
 _HELD = ("continuous", "revolute")
 
 
@@ -59,6 +63,7 @@ def write(model: Model) -> Exported:
 def read(text: str) -> Imported:
     """Return the planar chain of a URDF file."""
     robot = parse(text, "robot")
+    _refuse_foreign(robot)
     links = {link.get("name", ""): link for link in robot.findall("link")}
     by_parent: dict[str, list[ET.Element]] = {}
     children = set()
@@ -75,6 +80,22 @@ def read(text: str) -> Imported:
         raise BadInput("links", Text(f"{len(roots)} roots"), "one")
     stopped = [joint.get("name", "") for joint in robot.findall("joint") if joint.get("type") == "revolute"]
     return _walk(roots[0], links, by_parent).without_stops(stopped)
+
+
+def _refuse_foreign(robot: ET.Element) -> None:
+    """Refuse what would change the arm and is not read, or what says it twice: better no arm than another one."""
+    for parent in (element for element in robot.iter() if element.tag in ("link", "joint", "inertial")):
+        for tag in _ONCE:
+            if (count := len(parent.findall(tag))) > 1:
+                raise BadInput(f"<{parent.tag} {parent.get('name', '')!r}> <{tag}>", Text(f"{count} of them"), "one")
+        origin = parent.find("origin")
+        if origin is not None and (foreign := sorted(set(origin.keys()) - {"xyz", "rpy"})):
+            raise BadInput(f"<{parent.tag} {parent.get('name', '')!r}> <origin>", Text(", ".join(foreign)), "xyz and rpy")
+    for gazebo in robot.findall("gazebo"):
+        for element in gazebo.iter():
+            if element.tag in _NEUTRAL and (element.text or "").strip().lower() not in _NEUTRAL[element.tag]:
+                place = f"<gazebo {gazebo.get('reference', '')!r}> <{element.tag}>"
+                raise BadInput(place, element.text, _NEUTRAL[element.tag][0])
 
 
 def _end(joint: ET.Element, which: str) -> str:
