@@ -172,6 +172,11 @@ def test_a_marker_at_zero_in_some_samples_was_not_seen_there(tmp_path: Path) -> 
     assert np.flatnonzero(np.isnan(found.q[:, 1])).tolist() == [7, 8]
     assert found.lengths == pytest.approx(seen.lengths, abs=1e-9)
     assert any("markers are missing in 6.7 %" in line for line in found.warnings())
+    # A first joint may be the origin of the file, with gaps.
+    at_origin = positions - positions[:, :1]
+    at_origin[3, 0] = np.nan
+    found = armrs.planar_motion(armrs.read_markers(trc(tmp_path / "origin.trc", at_origin)), ["S", "E", "H"], up="z")
+    assert np.flatnonzero(np.isnan(found.q[:, 0])).tolist() == [3]
     lost[:, 2] = 0.0
     with pytest.raises(BadInput, match="points: found H at 0 0 0 in all samples"):
         armrs.planar_motion(armrs.read_markers(trc(tmp_path / "lost.trc", lost)), ["S", "E", "H"], up="z")

@@ -71,7 +71,8 @@ class Markers:
     def _seen(self, name: str) -> np.ndarray:
         at = self.positions[:, self._index(name)]
         lost = (at == 0.0).all(axis=1)
-        return at if lost.all() else np.where(lost[:, None], np.nan, at)
+        elsewhere = np.isfinite(at).all(axis=1) & ~lost
+        return np.where(lost[:, None], np.nan, at) if elsewhere.any() else at
 
     def _index(self, name: str) -> int:
         found = [k for k, label in enumerate(self.names) if name in (label, label.rpartition(":")[2])]
