@@ -104,6 +104,20 @@ def test_a_human_arm_in_c3d(data: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert header == "t_s,q1_rad,q2_rad"
 
 
+@pytest.mark.parametrize(("stated", "said"), [("+Z", 0), ("-Z", 1), ("+Y", 1)])
+def test_a_c3d_that_says_another_axis_points_up_is_told(stated: str, said: int, tmp_path: Path) -> None:
+    ezc3d = pytest.importorskip("ezc3d")
+    content = ezc3d.c3d()
+    content["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+    content["parameters"]["POINT"]["LABELS"]["value"] = ["S", "E", "H"]
+    content["parameters"]["POINT"]["UNITS"]["value"] = ["m"]
+    content.add_parameter("POINT", "Y_SCREEN", [stated])
+    content["data"]["points"] = np.concatenate([planar_arm(30)[1].transpose(2, 1, 0), np.ones((1, 3, 30))])
+    content.write(str(tmp_path / "arm.c3d"))
+    found = [line for line in armrs.read_markers(tmp_path / "arm.c3d").warnings if f"Y_SCREEN of the file is {stated}" in line]
+    assert len(found) == said
+
+
 def test_a_shoulder_in_trc(data: Path) -> None:
     markers = armrs.read_markers(data / "raw" / "arm_files" / "opensim_abdbonepin.trc")
     motion = armrs.planar_motion(markers, ["gu", "centelbow"])

@@ -32,6 +32,8 @@ class C3D:
     unit : str
     rate : float
         Frames a second [Hz].
+    y_screen : str
+        Axis that points up on the screen of the program that wrote it, such as `+Z`; empty where it does not say.
     analog_labels, analog_units : list of str
         Of the analog channels (force plates, EMG).
     analog : ndarray, shape (n_samples, n_channels)
@@ -44,6 +46,7 @@ class C3D:
     points: np.ndarray
     unit: str
     rate: float
+    y_screen: str
     analog_labels: list[str]
     analog_units: list[str]
     analog: np.ndarray
@@ -80,6 +83,7 @@ def _checked(content: Any) -> C3D:
         points=points,
         unit=str(content["unit"]),
         rate=rate,
+        y_screen=str(content["y_screen"]),
         analog_labels=[str(name) for name in content["analog_labels"]],
         analog_units=[str(name) for name in content["analog_units"]],
         analog=content["analog"],
@@ -131,12 +135,13 @@ def _arrays(path: Path) -> dict[str, Any]:
     point, analog = parameters["POINT"], parameters.get("ANALOG", {})
     points = np.asarray(content["data"]["points"], dtype=float)
     samples = np.asarray(content["data"]["analogs"], dtype=float)
-    units = _texts(point, "UNITS")
+    units, y_screen = _texts(point, "UNITS"), _texts(point, "Y_SCREEN")
     return {
         "labels": np.array(_texts(point, "LABELS"), dtype=str),
         "points": np.transpose(points[:3], (2, 1, 0)),
         "unit": units[0] if units else "",
         "rate": _first(point, "RATE", 0.0),
+        "y_screen": y_screen[0] if y_screen else "",
         "analog_labels": np.array(_texts(analog, "LABELS"), dtype=str),
         "analog_units": np.array(_texts(analog, "UNITS"), dtype=str),
         "analog": samples.reshape(samples.shape[-2], -1).T if samples.size else np.empty((0, 0)),

@@ -197,7 +197,11 @@ def markers_of(content: c3d.C3D) -> Markers:
         raise BadInput(
             "file", Text(f"{len(content.labels)} labels and data of shape {content.points.shape}"), "points with labels and samples"
         )
-    return Markers(content.labels, np.arange(len(content.points)) / content.rate, METRES[content.unit] * content.points, up="z")
+    notes: tuple[str, ...] = ()
+    if content.y_screen.lower().lstrip("+") not in ("", "z"):
+        notes = (f"POINT:Y_SCREEN of the file is {content.y_screen}, which may be what points up; z is taken unless --up names another",)
+    t = np.arange(len(content.points)) / content.rate
+    return Markers(content.labels, t, METRES[content.unit] * content.points, up="z", warnings=notes)
 
 
 def _check_places(points: Sequence[str], at: np.ndarray, lengths: np.ndarray) -> None:
