@@ -192,6 +192,7 @@ def test_a_marker_at_zero_in_some_samples_was_not_seen_there(tmp_path: Path) -> 
     found = armrs.planar_motion(armrs.read_markers(trc(tmp_path / "origin.trc", at_origin)), ["S", "E", "H"], up="z")
     assert np.flatnonzero(np.isnan(found.q[:, 0])).tolist() == [3]
     lost[:, 2] = 0.0
+    lost[5, 2] = np.nan
     with pytest.raises(BadInput, match="points: found H at 0 0 0 in all samples"):
         armrs.planar_motion(armrs.read_markers(trc(tmp_path / "lost.trc", lost)), ["S", "E", "H"], up="z")
 

@@ -205,7 +205,7 @@ def markers_of(content: c3d.C3D) -> Markers:
 
 
 def _check_places(points: Sequence[str], at: np.ndarray, lengths: np.ndarray) -> None:
-    """Refuse points, (n, k, 3), that were never seen or are no joints of an arm; lengths of the segments (samples, k - 1) [m]."""
+    """Refuse points, (n, k, 3), that were never seen or are no joints of an arm; lengths of the segments, (n, k - 1) [m]."""
     if lengths.min() < 1e-6:
         raise BadInput("points", Text("two neighbours at one place"), "points that lie apart")
     for k, length in enumerate(lengths.mean(axis=0), start=1):
@@ -253,7 +253,7 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
     segments = np.diff(at, axis=1)
     distances = np.linalg.norm(segments, axis=2)
     seen, lengths = segments[there], distances[there]
-    _check_places(points, at, lengths)
+    _check_places(points, at[there], lengths)
     scatter = np.einsum("nki,nkj->ij", seen, seen) / seen.shape[0]
     spread, axes = np.linalg.eigh(scatter)
     if np.sqrt(max(spread[1], 0.0) / spread[2]) < _LEAST_SPREAD:
