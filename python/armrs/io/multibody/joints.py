@@ -98,6 +98,14 @@ def parse(text: str, name: str) -> ET.Element:
     return root
 
 
+def plain_value(text: str) -> list[float] | str:
+    """Return the numbers of an attribute, or its word."""
+    try:
+        return [float(part) for part in text.split()]
+    except ValueError:
+        return text
+
+
 def vector(element: ET.Element, key: str, size: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
     """Return the numbers of an attribute."""
     text = element.get(key)

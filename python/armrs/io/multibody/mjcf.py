@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import BadInput, Text
 from ...model import Effect, Joint, Model
 from .chain import Body, Hinge, Imported, planar
-from .joints import Exported, document, laws, lost_effects, lost_robot, number, numbers, parse, vector
+from .joints import Exported, document, laws, lost_effects, lost_robot, number, numbers, parse, plain_value, vector
 
 _KNOWN_JOINT = {"name", "type", "axis", "pos", "stiffness", "springref", "damping", "frictionloss", "armature", "ref", "limited", "range"}
 _KNOWN_TENDON = {"name", "group", "user", "stiffness", "springlength"}
@@ -131,7 +131,7 @@ def _refuse_foreign(root: ET.Element) -> None:
             raise BadInput(f"<{tag}>", Text(f"{len(found)} of them"), "one: save the file as MuJoCo compiled it")
     for element in root.iter():
         for key, neutral in _NEUTRAL.get(element.tag, {}).items():
-            if _value(element.get(key, neutral[0])) not in map(_value, neutral):
+            if plain_value(element.get(key, neutral[0])) not in map(plain_value, neutral):
                 raise BadInput(f"<{element.tag}> {key}", element.get(key), " or ".join(neutral))
     for parent in root.iter():
         if parent.tag in ("worldbody", "body"):
@@ -141,14 +141,6 @@ def _refuse_foreign(root: ET.Element) -> None:
         if tendon.tag != "fixed" or (foreign := sorted(set(tendon.keys()) - _KNOWN_TENDON)):
             found_there = f"<{tendon.tag}>" if tendon.tag != "fixed" else ", ".join(foreign)
             raise BadInput("<tendon>", Text(found_there), "fixed tendons with stiffness and springlength alone")
-
-
-def _value(text: str) -> list[float] | str:
-    """Return the numbers of an attribute, or its word."""
-    try:
-        return [float(part) for part in text.split()]
-    except ValueError:
-        return text
 
 
 def _place(element: ET.Element) -> np.ndarray:

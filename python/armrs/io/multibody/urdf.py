@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import BadInput, Text
 from ...model import Joint, Model
 from .chain import Body, Hinge, Imported, planar
-from .joints import Exported, document, laws, lost_effects, lost_robot, number, numbers, parse, vector
+from .joints import Exported, document, laws, lost_effects, lost_robot, number, numbers, parse, plain_value, vector
 
 _ROOT = "ground"
 _TIP = "hand_tip"
@@ -93,9 +93,10 @@ def _refuse_foreign(robot: ET.Element) -> None:
             raise BadInput(f"<{parent.tag} {parent.get('name', '')!r}> <origin>", Text(", ".join(foreign)), "xyz and rpy")
     for gazebo in robot.findall("gazebo"):
         for element in gazebo.iter():
-            if element.tag in _NEUTRAL and (element.text or "").strip().lower() not in _NEUTRAL[element.tag]:
+            neutral = _NEUTRAL.get(element.tag)
+            if neutral and plain_value((element.text or "").strip().lower()) not in map(plain_value, neutral):
                 place = f"<gazebo {gazebo.get('reference', '')!r}> <{element.tag}>"
-                raise BadInput(place, element.text, _NEUTRAL[element.tag][0])
+                raise BadInput(place, element.text, neutral[0])
 
 
 def _end(joint: ET.Element, which: str) -> str:
