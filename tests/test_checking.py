@@ -151,6 +151,30 @@ def test_the_next_step_fits_the_cell(session: Path, tmp_path: Path) -> None:
     assert steps["slow_2.csv"] == "rename or remove one of the two"
 
 
+def test_one_cause_is_told_once(tmp_path: Path) -> None:
+    """Once for each posture with its own distance, again by the balance, and as a wrong weight besides."""
+    dataset = demo.measure(demo.true_model())
+    for joint, factors, words in ((1, [np.pi / 180.0, 1.0], "(radians labelled as degrees?)"), (2, [1.0, -1.0], "(this one mirrored?)")):
+        trials = tuple(replace(t, q=factors * t.q) for t in dataset.trials)
+        told = grouped(check_dataset(armrs.write_dataset(dataset.replace(trials=trials), tmp_path / f"joint {joint}")).problems)
+        assert len(told) == 1 and f"and 13 more: column q{joint}: " in told[0].text and words in told[0].text
+        assert told[0].next_step.startswith("import the recordings again")
+
+
+def test_lines_that_are_no_table_are_not_a_column_to_correct(session: Path, tmp_path: Path) -> None:
+    folder = changed(session, tmp_path / "set", {})
+    for name, content in (("slow_1", "# made by a tool\nt_s,q1_rad\n0,0\n"), ("slow_2", "\n"), ("slow_3", "t_s,q1_rad,q2_rad\n0,0\n")):
+        (folder / "trials" / f"{name}.csv").write_text(content, encoding="utf-8")
+    errors = [p for p in check_dataset(folder).problems if p.level == "error"]
+    for words in (
+        "line 1: found a comment, '# made by a tool', allowed the names of the columns; armrs import",
+        "line 1: found nothing",
+        "line 2: found 2",
+    ):
+        (problem,) = [p for p in errors if words in p.text]
+        assert problem.next_step.startswith("write one row with the names of the columns")
+
+
 def test_a_model_in_other_units_hides_nothing_and_brings_nothing_else(session: Path, tmp_path: Path) -> None:
     """Without a model each trial was said to have columns of joints that it does not have."""
     folder = changed(session, tmp_path / "set", {})

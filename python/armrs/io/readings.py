@@ -71,6 +71,12 @@ def _of_one_joint(n: int, joint: int) -> Iterator[Reading]:
         yield Reading(f"column {name}", between, turn, np.pi * np.eye(n)[joint])
 
 
+def of_unit_of_one(n: int) -> Iterator[Reading]:
+    """Give the angle of one joint of several in the other unit."""
+    for j in range(n) if n > 1 else ():
+        yield from _other_unit(f"column q{j + 1}", n, j)
+
+
 def of_robot_angles() -> Iterator[Reading]:
     """Give the robot's angles in the other unit and in the other order."""
     yield from _other_unit("columns qr1, qr2", 2)
@@ -78,9 +84,11 @@ def of_robot_angles() -> Iterator[Reading]:
     yield Reading("columns qr1, qr2", swapped, np.eye(2)[::-1], np.zeros(2))
 
 
-def _other_unit(place: str, n: int) -> Iterator[Reading]:
+def _other_unit(place: str, n: int, joint: int | None = None) -> Iterator[Reading]:
+    """Give the angles of all joints, or of one, from 0, in the other unit."""
     for factor, unit in ((_DEGREE, "degrees labelled as radians"), (1.0 / _DEGREE, "radians labelled as degrees")):
-        yield Reading(place, f"angles in the unit of their column ({unit}?)", factor * np.eye(n), np.zeros(n))
+        factors = np.where([joint in (None, j) for j in range(n)], factor, 1.0)
+        yield Reading(place, f"angles in the unit of their column ({unit}?)", np.diag(factors), np.zeros(n))
 
 
 def of_forces(n: int) -> Iterator[Reading]:

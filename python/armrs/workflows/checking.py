@@ -16,7 +16,7 @@ from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
 from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, read_entry
-from ..io.samples import header_of
+from ..io.samples import NUMBER, header_of
 from ..io.trial import Trial, moving_bases, still_angles
 from ..model import Description, Model
 from ..report.tables import how_many
@@ -197,10 +197,14 @@ def _remedy(error: ArmrsError) -> str:
         return "rename or remove one of the two"
     if "dead sensor" in (error.hint or ""):
         return "repair the sensor and record again, or leave the trial out of dataset.toml"
-    if "if read otherwise" in str(error.found):
+    if error.allowed == NUMBER and isinstance(error.found, str):
+        return "leave the cell empty where the sample is missing"
+    if any(words in str(error.found) for words in _MISREAD):
         return "import the recordings again and let armrs import find the convention, or correct the columns"
     of_samples = error.file is None or Path(error.file).suffix != ".toml"
-    if of_samples and place.startswith(("column", "line", "row", "Fy", "q", "angles")):
+    if of_samples and place.startswith("line"):
+        return "write one row with the names of the columns, then one row of numbers a sample; armrs import reads other tables"
+    if of_samples and place.startswith(("column", "row", "Fy", "q", "angles")):
         return "correct the column: its unit, its sign, or its values"
     return "correct it in the file that it names"
 
@@ -230,15 +234,35 @@ _WARNINGS = (
 """By words of a warning, what to do about it."""
 
 
-_OF_VALUES = ("times the masses", "hand and handle", "at a higher rate")
-"""Words of warnings that are computed with the angles and forces as given."""
+_MISREAD = ("if read otherwise", "from the robot's handle")
+"""Words of errors of columns that hold something else than their names say."""
+_OF_FORCES = ("times the masses", "the forces do not decide")
+"""Words of warnings that are computed with the forces as given."""
+_OF_VALUES = (*_OF_FORCES, "hand and handle", "at a higher rate", "in the fit trials: what holds it")
+"""The same, with the angles or the forces."""
+_MEASURED = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?(?= (?:mm?|s|rad(?:/s)?|N(?: m)?|Hz|%|samples)(?![\w/]))")
+"""A measured number, which is followed by its unit."""
 
 
 def _not_implied(problems: Iterable[Problem]) -> list[Problem]:
-    """Return problems without the warnings that only follow from an error: of columns that hold something else no weight can be told."""
+    """Return problems without what only follows from an error.
+
+    Of columns that hold something else, and of dead sensors, no weight can be told. What columns probably hold is told once, whether the
+    robot's handle or the balance of the arm shows it.
+    """
     told = list(problems)
-    misread = any(p.level == "error" and ("if read otherwise" in p.text or "from the robot's handle" in p.text) for p in told)
-    return [p for p in told if not (misread and p.level == "warning" and any(words in p.text for words in _OF_VALUES))]
+    errors = [p.text for p in told if p.level == "error"]
+    misread = any(words in text for text in errors for words in _MISREAD)
+    dead = any("dead sensor" in text for text in errors)
+    implied = _OF_VALUES if misread else _OF_FORCES if dead else ()
+    by_handle = {text.partition(", allowed ")[2] for text in errors if _MISREAD[1] in text}
+
+    def follows(p: Problem) -> bool:
+        if p.level == "error":
+            return _MISREAD[0] in p.text and p.text.partition(", allowed ")[2] in by_handle
+        return any(words in p.text for words in implied)
+
+    return [p for p in told if not follows(p)]
 
 
 def _feasible(problems: Iterable[Problem], dataset: Dataset) -> tuple[Problem, ...]:
@@ -350,15 +374,17 @@ def _rates(dataset: Dataset) -> Iterator[Problem]:
 
 
 def grouped(problems: Sequence[Problem]) -> list[Problem]:
-    """Return problems with those together that differ by their file alone."""
-    together: dict[tuple[str, str, str], list[str]] = {}
+    """Return problems with those together that differ by their file, or by what was measured in it, alone; of such, the first is shown."""
+    together: dict[tuple[str, str, str], list[Problem]] = {}
     for p in problems:
-        file, colon, rest = p.text.partition(": ")
-        together.setdefault((p.level, rest if colon else p.text, p.next_step), []).append(file if colon else "")
+        _, colon, rest = p.text.partition(": ")
+        together.setdefault((p.level, _MEASURED.sub("", rest) if colon else p.text, p.next_step), []).append(p)
     lines = []
-    for (level, rest, step), files in together.items():
-        more = f" and {len(files) - 1} more" if len(files) > 1 else ""
-        lines.append(Problem(level, f"{files[0]}{more}: {rest}" if files[0] else rest, step))
+    for alike in together.values():
+        first = alike[0]
+        file, colon, rest = first.text.partition(": ")
+        more = f" and {len(alike) - 1} more" if len(alike) > 1 else ""
+        lines.append(replace(first, text=f"{file}{more}: {rest}") if colon else first)
     return lines
 
 
