@@ -162,6 +162,7 @@ def good(tmp_path: Path) -> Path:
     [
         ("PathFileType", "Something", r"line 1: found no PathFileType"),
         ("\tmm\t", "\tinch\t", r"line 3, Units: found 'inch', allowed mm or m or cm"),
+        ("\tmm\t", "\t\t", r"line 3, Units: found nothing, allowed mm or m or cm"),
         ("\n7\t0.07\t", "\n7\t0.05\t", r"line 12, time: found 0.05 s after 0.06 s"),
         ("\n7\t0.07\t0.0\t", "\n7\t0.07\tO.O\t", r"line 12, column S.X: found 'O.O', allowed a number"),
         ("\n7\t0.07\t0.0\t", "\n7\t0.07\tinf\t", r"line 12, column S.X: found 'inf', allowed a finite number"),

@@ -104,7 +104,7 @@ def read_trc(path: Path) -> Markers:
     lines = _lines(path)
     if not lines or not lines[0].startswith("PathFileType") or len(lines) < _FIRST_ROW - 1:
         raise BadInput("line 1", Text("no PathFileType, or too few lines"), "a TRC file")
-    header = {k.lower(): v for k, v in zip(lines[1].split(), lines[2].split(), strict=False)}
+    header = _trc_header(lines[1], lines[2])
     unit = header.get("units", "")
     if unit not in METRES:
         raise BadInput("line 3, Units", unit or Text("nothing"), " or ".join(METRES))
@@ -129,6 +129,14 @@ def read_trc(path: Path) -> Markers:
         notes.append(f"the header announces {markers} markers, {len(names)} are there")
     positions = METRES[unit] * table[:, 2:].reshape(len(table), len(names), 3)
     return Markers(names, table[:, 1], positions, up="y", warnings=tuple(notes))
+
+
+def _trc_header(keys: str, values: str) -> dict[str, str]:
+    """Return the header of a TRC file, keys in lower case; between tabs a value may be blank."""
+    cells = [[cell.strip() for cell in line.rstrip("\r\n").split("\t")] for line in (keys, values)]
+    if len(cells[0]) != len(cells[1]):  # written with blanks, or with tabs behind the last cell
+        cells = [keys.split(), values.split()]
+    return {key.lower(): value for key, value in zip(*cells, strict=False)}
 
 
 def write_trc(path: Path, markers: Markers) -> Path:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, Text, not_utf8
+from ..errors import BadInput, Text, not_utf8, show
 from .files import may_replace, replacing
 
 SUFFIXES = (".csv", ".parquet")
@@ -101,6 +101,9 @@ def header_of(path: Path) -> list[str]:
         raise not_utf8("line 1", raw, error) from None
     if "\0" in text:
         raise BadInput("line 1", Text("binary data"), "CSV text")
+    if text.lstrip().startswith("#"):
+        found = f"a comment, {show(text.strip())}"
+        raise BadInput("line 1", Text(found), "the names of the columns; armrs import reads files with comment lines")
     names = [name.strip() for name in next(csv.reader([text]))]
     if len(names) == 1:
         for separator, word in ((";", "semicolons"), ("\t", "tabs")):

@@ -421,7 +421,7 @@ def _bridged_lines(channels: Mapping[str, resample.Channel]) -> list[str]:
     shares = {name: float(np.mean(c.bridged)) for name, c in channels.items() if not name.startswith("emg_")}
     return _lines(
         {
-            name: f"{share:.0%} of the samples were missing and are bridged; they count as measured: intervals promise too much"
+            name: f"{share:.0%} of the samples were missing and are bridged; they count as measured, so that intervals are too narrow"
             for name, share in shares.items()
             if share > BRIDGED
         }
