@@ -55,8 +55,10 @@ pub fn invalid(error: Invalid) -> PyErr {
             min,
             max,
         } => {
-            // The smallest positive number of either precision stands for "above zero", the largest for "any".
-            let positive = min > 0.0 && min <= f64::from(f32::MIN_POSITIVE);
+            // The smallest positive number of either precision stands for "above zero", unless what was found lies between the two; the
+            // largest stands for "any".
+            let positive =
+                min > 0.0 && min <= f64::from(f32::MIN_POSITIVE) && !(found > 0.0 && found < min);
             let any = max >= f64::from(f32::MAX);
             let (low, high) = (Shown(min), Shown(max));
             let allowed = match (positive, any) {
