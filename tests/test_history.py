@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -72,6 +73,22 @@ def test_the_same_session_replaces_itself_and_order_is_by_date(identified: Ident
     sessions.add(file, identified, "2026-03-01")
     courses = sessions.add(file, identified, "2026-01-01").courses
     assert all(c.dates == ("2026-01-01", "2026-03-01") and c.change == 0.0 for c in courses)
+
+
+def test_a_session_in_another_unit_is_told(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A history whose units were altered was compared without these sessions, and nothing said so."""
+    file = tmp_path / "s.sqlite"
+    verb = ["identify", str(slow_arm), "--with", "coulomb", "--json", str(tmp_path / "r.json"), "--history", str(file), "--date"]
+    assert main([*verb, "2026-01-01"]) == 0
+    with contextlib.closing(sqlite3.connect(file)) as connection:
+        connection.execute("UPDATE estimate SET unit = 'N mm' WHERE kind = 'coulomb' AND joint = 2")
+        connection.commit()
+    capsys.readouterr()
+    assert main([*verb, "2026-02-01"]) == 0
+    said = "warning: history, coulomb torque of joint 2: found 'N mm' on 2026-01-01, allowed 'N m' as in the last session: not compared"
+    assert [line for line in capsys.readouterr().err.splitlines() if "history" in line] == [said]
+    courses = json.loads((tmp_path / "r.json").read_text())["history"]
+    assert {(c["kind"], c["joint"]): len(c["dates"]) for c in courses if c["kind"] == "coulomb"} == {("coulomb", 1): 2, ("coulomb", 2): 1}
 
 
 def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -48,7 +48,9 @@ def kept(history: Path | None, result: Followed, day: str, plain: dict[str, Any]
         if history is not None:
             from ..workflows import history as sessions
 
-            plain["history"] = stack.enter_context(sessions.adding(history, result, day)).to_dict()["courses"]
+            followed = stack.enter_context(sessions.adding(history, result, day))
+            console.warn(followed.warnings)
+            plain["history"] = followed.to_dict()["courses"]
         yield
 
 

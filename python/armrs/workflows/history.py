@@ -6,7 +6,7 @@ import datetime
 import os
 import re
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -167,10 +167,13 @@ class History(Tabular):
     subject : str or None
     courses : tuple of Course
         One for every parameter that the data decided in the last session.
+    warnings : tuple of str
+        What the file holds that cannot be compared.
     """
 
     subject: str | None
     courses: tuple[Course, ...]
+    warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         changed = [c.label for c in self.courses if c.changed]
@@ -332,7 +335,7 @@ def _courses(connection: sqlite3.Connection, method: str) -> History:
         "WHERE s.method = ? AND e.decided_by = 'data' ORDER BY s.date, s.id, e.rowid",
         (method,),
     ).fetchall()
-    by_parameter: dict[tuple[str, str, int, str], list[_Point]] = {}
+    by_parameter: dict[_Key, list[_Point]] = {}
     beside: dict[tuple[int, int], set[tuple[str, str]]] = {}
     for name, kind, joint, unit, date, value, std, session in rows:
         by_parameter.setdefault((name, kind, joint, unit), []).append((date, value, std, session))
@@ -365,7 +368,19 @@ def _courses(connection: sqlite3.Connection, method: str) -> History:
             followed.items(), tests, adjusted, lasts, adjusted_last, strict=True
         )
     )
-    return History(_whose(connection), courses)
+    return History(_whose(connection), courses, _in_other_units(by_parameter, followed))
+
+
+def _in_other_units(known: Mapping[_Key, Sequence[_Point]], followed: Iterable[_Key]) -> tuple[str, ...]:
+    """Return which sessions are left out, since their unit is not that of the last session; armrs writes each parameter in one."""
+    lines = []
+    for name, kind, joint, unit in followed:
+        for other, points in known.items():
+            if other[:3] == (name, kind, joint) and other[3] != unit:
+                of = f"{kind} {name}{f' of joint {joint}' if joint else ''}"
+                dates = ", ".join(date for date, *_ in points)
+                lines.append(f"history, {of}: found {show(other[3])} on {dates}, allowed {show(unit)} as in the last session: not compared")
+    return tuple(lines)
 
 
 def _open(file: Path) -> sqlite3.Connection:
@@ -456,6 +471,8 @@ def _usable(estimate: Estimate) -> bool:
 
 _Point = tuple[str, float, float, int]
 """Date, value, standard deviation, session."""
+_Key = tuple[str, str, int, str]
+"""Name, kind, joint (0 for none) and unit of a parameter."""
 
 
 def _change(points: Sequence[_Point]) -> tuple[float, float, float]:
