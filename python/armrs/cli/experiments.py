@@ -68,7 +68,7 @@ def simulate(
         float, typer.Option(help="Samples a second that are recorded [Hz], 0.001 or more; a whole number of steps from one to the next.")
     ] = 50.0,
     integrator: Annotated[
-        Integrator | None, typer.Option(help="Of the native engine: fourth order, taken when absent, or semi-implicit first order.")
+        Integrator | None, typer.Option(help="Of the native engine: of fourth order (when absent), or semi-implicit of first order.")
     ] = None,
     coupling: Annotated[Coupling, typer.Option(help="How the handle holds the tip.")] = Coupling.compliant,
     duration_s: Annotated[
@@ -76,7 +76,7 @@ def simulate(
         typer.Option(help="Length of the run [s], a whole number of steps, at least 1/rate; that of the movement or trial when absent."),
     ] = None,
     check_step: Annotated[
-        bool, typer.Option("--check-step", help="Simulate once more with half the step, and say what that changes.")
+        bool, typer.Option("--check-step", help="Simulate once more with half the step, and report the difference.")
     ] = False,
     to: SamplesFormat = None,
     json: JsonFile = None,
@@ -245,7 +245,9 @@ def record(
         if any(run.tests for run in planned.runs)
         else "; tests = 1 in [[movement]] records a trial that is kept apart to test the result on"
     )
-    present(lambda: plain, json, lambda: words.recorded(plain, report), f"armrs gap {quoted(out)} -o gap{apart}")
+    worn = ", ".join(run.configuration for run in planned.runs if run.worn)
+    alike = f"remove [[added]] and the trials of {worn} from {quoted(out / 'dataset.toml')}, then " if worn else ""
+    present(lambda: plain, json, lambda: words.recorded(plain, report), f"{alike}armrs gap {quoted(out)} -o gap{apart}")
     return 1 if result.stopped else 0
 
 

@@ -190,7 +190,10 @@ def refuse_other_arms(dataset: Dataset) -> None:
         allowed = f"1 to {_MOST_SEGMENTS} segments; only kernels, passive moments and co-simulation take more"
         raise BadInput("[[arm.segment]]", dataset.model.n_joints, allowed, file=dataset.model_path)
     if dataset.added:
-        raise BadInput("[[added]]", Text("masses worn in some configurations"), "one arm in all trials: leave those configurations out")
+        worn = ", ".join(dict.fromkeys(name for item in dataset.added for name in item.configurations)) or "all of them"
+        allowed = "one arm in all trials: remove [[added]] and these trials, or add what is worn in all trials to the model"
+        file = None if dataset.folder is None else dataset.folder / FILE
+        raise BadInput("[[added]]", Text(f"masses worn in some configurations ({worn})"), allowed, file=file)
 
 
 @telling
