@@ -21,6 +21,8 @@ def page() -> str:
         "# The catalogue of effects",
         "Generated from the core by `scripts/effects_page.py`; `armrs effects` prints the same. "
         "`R` is a torque with which a joint resists.",
+        f"The catalogue has {len(kinds)} effects. `armrs gap` searches for {sum(kind.searched for kind in kinds)} of them; the sections of "
+        "the others say so.",
         "In a model an effect is a table `[[effect]]` with `kind`, where it acts, and its parameters; what is left out takes its default.",
         "Dry friction has a `smoothing`. Above 0 the sign of the speed is `tanh(q̇/smoothing)`: a joint at rest creeps, and an explicit "
         "step must resolve the steep slope at rest. With `smoothing = 0` friction is set-valued: `sgn(q̇)` in motion, and at rest whatever "
@@ -38,7 +40,7 @@ def entry(kind: Kind) -> str:
     """Return the section of one kind."""
     rows = [f"| `{p.name}` | {p.unit} | {'0 or ' if p.or_zero else ''}{p.min:g} to {p.max:g} | {p.default:g} |" for p in kind.parameters]
     table = "\n".join(["| parameter | unit | allowed | default |", "| --- | --- | --- | --- |", *rows])
-    unasked = "" if kind.searched else " `armrs gap` does not ask for it: put it into the model, or name it to `identify --with`."
+    unasked = "" if kind.searched else " `armrs gap` does not search for it: put it into the model, or name it to `identify --with`."
     head = f"### `{kind.kind}`\n{kind.summary}; at: {ADDRESS[kind.address]}.{unasked}"
     return f"{head}\n\n    {kind.formula}\n\nSource: {kind.reference}.\n\n{table}"
 

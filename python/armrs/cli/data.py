@@ -55,11 +55,14 @@ def effects(
     def human() -> None:
         for entry in chosen:
             needs = f", needs {entry.address}" if entry.address else ""
-            print(f"{entry.kind} ({entry.where}{needs}): {entry.summary}")
+            print(f"{entry.kind} ({entry.where}{needs}): {entry.summary}{'' if entry.searched else '; gap does not search for it'}")
             print(f"    {entry.formula}    [{entry.reference}]")
             for p in entry.parameters:
                 print(f"    {p.name}: {'0 or ' if p.or_zero else ''}{_range(p.min, p.max)} {p.unit}, default {p.default:g}")
             print()
+        if kind is None:
+            searched = sum(entry.searched for entry in chosen)
+            print(f"{len(chosen)} effects; armrs gap searches for {searched} of them. The others are for models and armrs identify --with.")
 
     present(data, json, human)
 
@@ -153,7 +156,7 @@ def report(
     sources: Annotated[list[Path], typer.Argument(metavar="RESULT.json…", help="Results that other verbs wrote.")],
     out: OutFolder = Path(),
     summary: Annotated[bool, typer.Option("--summary", help="One page in plain words for a clinician, summary.html, instead.")] = False,
-    norms: Annotated[Path | None, typer.Option(metavar="FILE", help="TOML with what is usual, shown in the summary.")] = None,
+    norms: Annotated[Path | None, typer.Option(metavar="FILE", help="TOML file with the usual ranges, shown in the summary.")] = None,
 ) -> None:
     """Make one self-contained HTML report, report.html, of any results.
 
