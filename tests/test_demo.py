@@ -115,7 +115,9 @@ def test_the_report_stands_alone_and_says_synthetic(folder: Path) -> None:
     assert page.count("Synthetic data: simulated, not measured") == 4
     assert page.count("<img") == page.count('src="data:image/png;base64,') >= 14
     # It opens with one sentence and the picture of the gap.
-    assert page.index('class="verdict"') < page.index("What is missing, and what it is worth") < page.index(">What was done</h2>")
+    assert (
+        page.index('class="verdict"') < page.index("What is missing, and how much of the gap it closes") < page.index(">What was done</h2>")
+    )
     assert (folder / "copy.json").read_text(encoding="utf-8") == (folder / "demo.json").read_text(encoding="utf-8")
 
 

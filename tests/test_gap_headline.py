@@ -10,7 +10,7 @@ from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
 from armrs.workflows.gap.headline import headline, still_open
 from armrs.workflows.gap.summary import marks
-from armrs.workflows.gap.words import gap, intervals, left, missing, named, others, tie
+from armrs.workflows.gap.words import gap, intervals, left, missing, named, nearest, others, tie
 
 
 def channel(before: float, calibrated: float, after: float, floor: float | None) -> dict[str, Any]:
@@ -221,6 +221,13 @@ def test_effects_stand_joint_by_joint_as_on_the_page_for_a_clinician() -> None:
     assert [line.split(":")[0] for line in named(told)] == ["coulomb in joint 1 (shoulder)", "coulomb in joint 2 (elbow)", "coulomb"]
 
 
+def test_an_effect_with_two_sizes_came_nearest_once() -> None:
+    """A compliance along y and along z stood in two equal rows."""
+    asked = [("contact_compliance", None, 21.4, 23.9), ("contact_compliance", None, 21.4, 23.9), ("viscous", 1, 3.0, 18.0)]
+    told = [dict(zip(("kind", "joint", "gain", "price"), row, strict=True)) | {"channel": None} for row in asked]
+    assert nearest({"would_have_seen": told}).rows == [["contact_compliance", None, "21.4", "23.9"], ["viscous", 1, "3", "18"]]
+
+
 def test_alternatives_are_compared_in_one_unit() -> None:
     """It was called a misfit, as was what is left in units of the floor."""
     rival = effect("viscous", 2, why="explains these movements nearly as well", worse=7.1)
@@ -238,7 +245,7 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     assert lines[1].endswith("40 standard deviations apart (now 13, which the law that is not exact may make).")
     assert "or by what a law that is not exact may miss: on these" in tie(result("explained", {**DRY, "alternatives": [far]}))
     assert "log-likelihood: on these" in tie(result("explained", {**DRY, "alternatives": [rival]}))
-    for worse, said in ((-729.0, "(why, by 729 units more)."), (-3.0, "(why, by no less)."), (0.05, "(why, by no less).")):
+    for worse, said in ((-729.0, "(why, by 729 units more)."), (-3.0, "(why)."), (0.05, "(why).")):
         other = effect("viscous", 2, why="why", worse=worse)
         [line] = others(result("explained", {**DRY, "alternatives": [other]}))
         assert line.endswith(said)

@@ -243,7 +243,7 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     print(f"{SYMBOLS}\n")
     print(result["missing_text"])
     print()
-    print("The slow movements alone cannot tell everything apart:")
+    print("The slow movements alone do not separate all effects:")
     print("\n".join(f"  {line}" for line in result["slow_alone"]["lines"]))
     print()
     print(verdict(result))

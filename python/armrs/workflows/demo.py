@@ -345,7 +345,7 @@ def of_slow_movements(slow: GapFound) -> list[str]:
         if rivals:
             lines.append(f"{name}: cannot be told from {joined([kind.replace('_', ' ') for kind in rivals], 'or')} by these movements")
         else:
-            lines.append(f"{name}: nothing else explains them as well")
+            lines.append(f"{name}: no other effect explains them as well")
     return lines
 
 
@@ -364,23 +364,24 @@ def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[
             f"The model handed over was {100 * (TOO_HEAVY - 1):.0f} % too heavy and had no brakes.",
             f"Two speeds (folder session): {slow} at {TWO_SPEEDS['slow-low'].speed:g} rad/s, one joint at a time, and {quick} at "
             f"{TWO_SPEEDS['quick'].speed:g} rad/s, both joints. {len(session.fit_trials)} trials were fitted, {len(session.test_trials)} "
-            "kept apart. The search asked the whole catalogue of effects and was told nothing of the brakes.",
+            "kept as test trials. The search had no information on the brakes.",
             f"The thesis (folder data): the robot swung one joint at a time by ±{SWING_DEG:g}° about three postures at {SPEED:g} "
-            f"rad/s. {len(data.fit_trials)} trials were fitted with what the search had found; {len(data.test_trials)} were only "
-            "checked on, some of them about a posture that was never fitted.",
+            f"rad/s. {len(data.fit_trials)} trials were fitted with the effects that the search had found; {len(data.test_trials)} are "
+            "test trials, some of them about a posture that was never fitted.",
             f"Sensors read both: 0.1° of noise on angles, 0.2 N on forces, 12 bits over ±110 N, {data.sample_rate:g} Hz. Repeats differ by "
-            "sensor noise alone, which is kinder than a laboratory.",
+            "sensor noise alone; in a laboratory they differ by more.",
         ],
         "slow_alone": {"verdict": headline(gap_data(made.gap_of_slow)), "lines": of_slow_movements(made.gap_of_slow)},
         "comparison": rows,
         "comparison_text": (
-            f"Identified with what was found, on the slow session of the thesis: everything that its movements determine is within "
-            f"{worst:.1f} % of what was simulated. The relative errors of the thesis' own identification of the real arm with brakes "
-            "on (table 4.5) stand beside. Slow movements show the moments and the friction, not the masses: those rest on the model given."
+            f"Identified with the effects found, on the slow session of the thesis: everything that its movements determine is within "
+            f"{worst:.1f} % of the simulated value. The table also has the relative errors of the thesis' own identification of the real "
+            "arm with brakes on (table 4.5). Slow movements determine the first moments and the friction, not the masses: those come "
+            "from the given model."
         ),
         "missing_text": (
-            "What the identified model leaves of the test trials differs between the directions of motion where friction is missing. Half "
-            "that difference, without and with what was found: "
+            "Where friction is missing, the residual torque on the test trials differs between the directions of motion. Half of this "
+            "difference, without and with the effects found: "
             + ", ".join(f"{j.name} {a:.3f} and {b:.3f} N m" for j, a, b in zip(data.model.joints, *gaps, strict=True))
             + "."
         ),

@@ -170,9 +170,9 @@ def _search_trace(result: GapFound) -> Drawn:
     ax.set_xlabel("explained, in units of twice the log-likelihood")
     ax.xaxis.set_major_formatter(lambda value, _: f"{value:.6g}")
     text = (
-        "Each round asks the whole catalogue, with segments and calibration refitted; the best few are converged by simulation and "
-        "drawn here. The blue one pays best for its freedom and goes on; what no longer pays then is taken out again, so that fewer "
-        "may be named in the end."
+        "Each round tests the whole catalogue, with segments and calibration refitted; the best few candidates are refitted by simulation "
+        "and drawn here. The blue one gains most beyond the gain that its parameters require, and is kept. Effects that no longer gain "
+        "enough are removed again, so that fewer may be named in the end."
     )
     return Drawn("search_trace", "The evidence, round by round", text, figure, "evidence")
 

@@ -46,11 +46,11 @@ def summary(result: GapFound) -> Drawn:
         one = "what repeats differ by" if all(g.floor for g in gaps.values()) else "what the calibrated model leaves"
         text += f" Right, simulated less measured on trials that were kept apart, in units of {one}."
         if result.effects:
-            text += " The step from calibrated to the named effects is what the names are worth."
+            text += " The step from calibrated to the named effects is due to the named effects alone."
     else:
         right.set_axis_off()
         right.text(0.0, 0.5, "There is no test trial to measure the gap on.")
-    return Drawn("summary", "What is missing, and what it is worth", text, figure, "first")
+    return Drawn("summary", "What is missing, and how much of the gap it closes", text, figure, "first")
 
 
 # ---- the arm

@@ -119,10 +119,10 @@ def _separating(alternative: Mapping[str, Any]) -> str:
     now, then = (digits(separation[key], 2) for key in ("now", "then"))
     if (alternative.get("worse") or 0.0) > _BETTER:
         now += ", which the law that is not exact may make"
+    best = alternative["separating_movement"]
     if separation["then"] < _TELLS:
-        best = alternative["separating_movement"]
-        return f"none of the movements tried would; the best, {best}, leaves them {then} standard deviations apart (now {now})."
-    return f"{alternative['separating_movement']}; with one such trial they would be {then} standard deviations apart (now {now})."
+        best = f"no movement that was tried separates them clearly. The best: {best}"
+    return f"{best}; with one such trial they would be {then} standard deviations apart (now {now})."
 
 
 def _how(alternative: Mapping[str, Any]) -> str:
@@ -130,7 +130,7 @@ def _how(alternative: Mapping[str, Any]) -> str:
     if worse is None:
         return str(alternative["why"])
     if abs(worse) < 0.1 or -_BETTER < worse < 0.0:
-        return alternative["why"] + ", by no less"
+        return str(alternative["why"])
     size = f"{abs(worse):{'.0f' if abs(worse) >= 10.0 else '.2g'}}"
     return f"{alternative['why']}, by {size} units {'less' if worse > 0.0 else 'more'}"
 
@@ -166,7 +166,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
             f"differ by {channel['floor']:.2g}{headline.place(result, name)}."
         )
     if result["unexplained"]["share"]:
-        lines.append(f"{result['unexplained']['share']:.1%} of what was beyond noise is still there.")
+        lines.append(f"Of the calibrated model's residual beyond noise, {result['unexplained']['share']:.1%} remains.")
     if result["unexplained"]["looks_like"]:
         looks = result["unexplained"]["looks_like"]
         lines.append(f"{looks[0].upper()}{looks[1:]}.")
@@ -322,7 +322,10 @@ def _condition(place: Mapping[str, Any], joints: Sequence[str]) -> str:
 def nearest(data: Mapping[str, Any], most: int = 8) -> Table:
     """Return what came nearest to being named and was not."""
     asked = sorted((w for w in data["would_have_seen"] if w.get("price")), key=lambda w: w["price"] - w["gain"])
-    rows = [[w["kind"], w["joint"] or w["channel"], f"{w['gain']:.3g}", f"{w['price']:.3g}"] for w in asked[:most]]
+    once: dict[tuple[str, Any], Mapping[str, Any]] = {}
+    for w in asked:
+        once.setdefault((w["kind"], w["joint"] or w["channel"]), w)  # an effect along y and z has two sizes
+    rows = [[*effect, f"{w['gain']:.3g}", f"{w['price']:.3g}"] for effect, w in list(once.items())[:most]]
     return Table(["effect", "at", "gain", "gain needed"], rows, 2)
 
 
