@@ -226,7 +226,7 @@ fn faults(arm: &Arm, j: usize) -> Vec<(&'static str, Fault<'_>)> {
     }
     for load in [5.0, 40.0] {
         all.push((
-            "load that is not told, 0.5 to 4 kg",
+            "unannounced load, 0.5 to 4 kg",
             changed(arm, move |s, _, _| {
                 // A weight at the hand, which nothing measures but the joints.
                 let reach: f64 = libm::cos(s.q[0]) * 0.3;
