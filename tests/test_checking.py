@@ -161,6 +161,18 @@ def test_one_cause_is_told_once(tmp_path: Path) -> None:
         assert told[0].next_step.startswith("import the recordings again")
 
 
+def test_worn_masses_keep_identify_and_gap_from_an_arm(session: Path, tmp_path: Path) -> None:
+    """Both were said to be able to use it, and refused it."""
+    folder = changed(session, tmp_path / "set", {})
+    worn = '\n[[added]]\nsegment = 2\nmass = 0.2\nat = 0.1\nconfigurations = ["slow"]\n'
+    with (folder / "dataset.toml").open("a", encoding="utf-8") as file:
+        file.write(worn)
+    found = check_dataset(folder)
+    assert [v.able for v in found.verbs] == [False, True, False] and len(found.errors) == 1
+    refused = f"{folder / 'dataset.toml'}: [[added]]: found masses worn in some configurations (slow), allowed one arm in all trials"
+    assert found.errors[0].text.startswith(refused)
+
+
 def test_lines_that_are_no_table_are_not_a_column_to_correct(session: Path, tmp_path: Path) -> None:
     folder = changed(session, tmp_path / "set", {})
     for name, content in (("slow_1", "# made by a tool\nt_s,q1_rad\n0,0\n"), ("slow_2", "\n"), ("slow_3", "t_s,q1_rad,q2_rad\n0,0\n")):

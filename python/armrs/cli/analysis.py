@@ -93,11 +93,11 @@ def identify(
     date: SessionDate = None,
     json: JsonFile = None,
 ) -> int:
-    """Identify body segment and joint parameters, each with an interval and what decided it.
+    """Identify body segment and joint parameters, each with an interval and what determined it.
 
-    Exit status 1 when the solver did not converge fully, when the result cannot be true of this arm and these sensors, when more than
-    half the variation of a joint's torque is left, or when speeds are noise to a good part. Above a fifth of that variation there is a
-    warning. A result with status 1 is not added to a history.
+    Exit status 1 in four cases: the solver did not converge fully; the result is impossible for this arm and these sensors; more than half
+    of the variation of a joint's torque remains unexplained (above a fifth there is a warning); or noise is a large part of the speeds. A
+    result with status 1 is not added to a history.
     """
     from ..io.dataset import load_dataset
     from ..report import words

@@ -15,7 +15,7 @@ import numpy as np
 from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
-from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, read_entry
+from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, read_entry, refuse_other_arms
 from ..io.samples import NUMBER, header_of
 from ..io.trial import Trial, moving_bases, still_angles
 from ..model import Description, Model
@@ -155,7 +155,10 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     tell("clocks", 0.6)
     problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
-    return Checked(_feasible(dict.fromkeys(_not_implied(problems)), dataset), _abilities(dataset, blocked), dataset)
+    whole = dataset.replace(folder=path.parent, added=description.added)
+    other = _other_arm(whole)
+    problems += other
+    return Checked(_feasible(dict.fromkeys(_not_implied(problems)), whole), _abilities(whole, blocked, bool(other)), whole)
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
@@ -388,12 +391,19 @@ def grouped(problems: Sequence[Problem]) -> list[Problem]:
     return lines
 
 
+def _other_arm(dataset: Dataset) -> list[Problem]:
+    """Return that the arm is none that `identify` and `gap` take, where `passive` does."""
+    found: list[Problem] = []
+    _caught(partial(refuse_other_arms, dataset), found)
+    return found
+
+
 def _is_led(dataset: Dataset) -> bool:
     whole = all(t.robot_q is not None and t.force_on_arm is not None for t in dataset.trials)
     return dataset.model.robot is not None and whole
 
 
-def _abilities(dataset: Dataset, blocked: bool) -> tuple[Ability, ...]:
+def _abilities(dataset: Dataset, blocked: bool, other_arm: bool) -> tuple[Ability, ...]:
     if blocked:
         return tuple(Ability(verb, False, "correct the errors above first") for verb in ("identify", "passive", "gap"))
     efforts = [t for t in dataset.fit_trials if t.force_on_arm is not None or t.tau is not None]
@@ -401,9 +411,13 @@ def _abilities(dataset: Dataset, blocked: bool) -> tuple[Ability, ...]:
     lacking = [] if repeats else ["repeats to estimate the noise from"]
     lacking += [] if dataset.test_trials else ['trials with role = "test" to measure the gap on']
     how = _how_gap(dataset)
+    passive = Ability("passive", bool(efforts), _how_passive(efforts))
+    if other_arm:
+        why = "correct the error above first"
+        return Ability("identify", False, why), passive, Ability("gap", False, why)
     return (
         Ability("identify", bool(efforts), f"{len(efforts)} fit trials with forces or torques" if efforts else "no forces and no torques"),
-        Ability("passive", bool(efforts), _how_passive(efforts)),
+        passive,
         Ability("gap", bool(efforts), f"{how}{'; without ' + ' and '.join(lacking) if lacking else ''}"),
     )
 
