@@ -210,7 +210,7 @@ def test_intervals_claim_no_more_than_holds(tmp_path: Path) -> None:
             {"warnings": ["the residual of joint 2 is 28% of the variation of its torque"]},
             "too narrow: the analysis does not describe",
         ),
-        ("noisy", {"parameters": [{**e, "caveat": "noise"} for e in rubs]}, "speeds are noise to a good part; a joint rubs"),
+        ("noisy", {"parameters": [{**e, "caveat": "noise"} for e in rubs]}, "a large part of the speeds is noise; a joint rubs"),
     ):
         source = tmp_path / f"{name}.json"
         source.write_text(json.dumps(result(**changes)), encoding="utf-8")

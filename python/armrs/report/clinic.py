@@ -536,7 +536,7 @@ def doubts(results: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         if any(str(warning).startswith("the residual of joint") for warning in result.get("warnings", ())):
             yield "the analysis does not describe all that was measured"
         if any(e.get("caveat") for e in estimates):
-            yield "speeds are noise to a good part"
+            yield "a large part of the speeds is noise"
         if any(_is_dry(e["kind"]) and e["decided_by"] == "data" and e["interval"][0] > 0.0 for e in estimates):
             yield _MOVING
         if result.get("verdict") == "unexplained":

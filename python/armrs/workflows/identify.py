@@ -527,7 +527,7 @@ leaves or takes goes into masses and calibration."""
 
 
 def _noisy_speeds(shares: Sequence[float]) -> tuple[str, ...]:
-    """Return the joints whose speeds are noise to a good part, a line each."""
+    """Return the joints whose speeds are noise for a large part, a line each."""
     return tuple(
         f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are biased by "
         "more than their intervals say, and masses with them; give the robot's angles and a [robot], measured speeds, or a lower cutoff"
