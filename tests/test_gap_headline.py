@@ -162,6 +162,14 @@ def test_an_effect_is_drawn_where_it_acts(kind: str, joint: int | None, marked: 
     assert marks(Missing(kind, joint, None, {}, 0.0, 1.0), catalogue()[kind]) == marked
 
 
+def test_where_nothing_is_named_the_table_shows_what_the_headline_says() -> None:
+    """The last fit moves the contact: the headline told 1.2 N of it, the table 1.0 N of the fit before."""
+    told = result("unexplained", gap={"Fy_N": channel(1.8, 1.0, 1.2, 0.084)})
+    assert "off by 1.2 N" in headline(told)
+    table = gap(told)
+    assert table.rows[0][table.head.index("calibrated")] == "1.2"
+
+
 def test_no_more_than_all_of_a_gap_is_closed() -> None:
     """Both the gap that is left and what repeats differ by are estimates: the first may be the smaller one."""
     table = gap(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.10, 0.15)}))

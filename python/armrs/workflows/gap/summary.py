@@ -96,13 +96,16 @@ def _words(effect: Missing) -> str:
 
 def shrinking(result: GapFound, gaps: Mapping[str, ChannelGap], ax: Axes) -> None:
     """Draw the gap of every channel in units of its floor (without repeats: of the calibrated gap), step by step."""
-    steps = list(STEPS) if any(e.trial is None for e in result.effects) else ["before", "calibrated"]
+    named = any(e.trial is None for e in result.effects)
+    steps = list(STEPS) if named else ["before", "calibrated"]
     floors = all(g.floor for g in gaps.values())
     opened = still_open(result.to_dict() | {"data": {"joints": []}})
     largest = 1.0
     for row, (name, gap) in enumerate(gaps.items()):
         one = (gap.floor if floors else gap.calibrated) or 1.0
-        values = [(step, getattr(gap, step)) for step in steps]
+        # Where nothing was named, the calibrated model is that of the last fit, as in the headline.
+        last = gap.calibrated if named or gap.after is None else gap.after
+        values = [(step, last if step == "calibrated" else getattr(gap, step)) for step in steps]
         seen = [(step, value / one) for step, value in values if value is not None]
         largest = max(largest, *(value for _, value in seen))
         ax.hlines(row, min(v for _, v in seen), max(v for _, v in seen), color=plotting.SILVER, lw=2.4, zorder=1)

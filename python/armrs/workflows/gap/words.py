@@ -153,8 +153,8 @@ def left(result: Mapping[str, Any]) -> list[str]:
         if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
             verdict = f"{'more' if lack['z'] >= MISFIT else 'no more'} than noise explains"
             lines.append(
-                f"{words} leaves residuals that repeats share, with {digits(lack['ratio'])} times the variance between repeats: {verdict} "
-                f"({_deviations(lack['z'])} standard deviations, limit {MISFIT:g})."
+                f"{words} leaves residuals on the fit trials that repeats share, with {digits(lack['ratio'])} times the variance between "
+                f"repeats: {verdict} ({_deviations(lack['z'])} standard deviations, limit {MISFIT:g})."
             )
     if not lines:
         lines.append(_UNTESTED)
@@ -166,7 +166,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
             f"differ by {channel['floor']:.2g}{headline.place(result, name)}."
         )
     if result["unexplained"]["share"]:
-        lines.append(f"Of the calibrated model's residual beyond noise, {result['unexplained']['share']:.1%} remains.")
+        lines.append(f"Of the calibrated model's residual beyond noise on the fit trials, {result['unexplained']['share']:.1%} remains.")
     if result["unexplained"]["looks_like"]:
         looks = result["unexplained"]["looks_like"]
         lines.append(f"{looks[0].upper()}{looks[1:]}.")
@@ -273,14 +273,18 @@ def worth(data: Mapping[str, Any]) -> str:
 
 
 def gap(data: Mapping[str, Any]) -> Table:
-    """Return the gap of every channel: as given, calibrated, with the named effects, and the floor."""
+    """Return the gap of every channel: as given, calibrated, with the named effects, and the floor.
+
+    Where nothing was named, the calibrated model is that of the last fit, by which verdict and headline judge.
+    """
     named = any(not e.get("trial") for e in data["effects"])
     opened = headline.still_open(data)
-    steps = ("before", "calibrated", "after", "floor") if named else ("before", "calibrated", "floor")
+    steps = ("before", "calibrated", "after", "floor") if named else ("before", "last", "floor")
     rows: list[list[object]] = []
     for name, channel in data["gap"].items():
         if channel["before"] is None:
             continue
+        channel = {**channel, "last": headline.left(channel)}
         above = None if None in (channel["floor"], channel["calibrated"]) else channel["calibrated"] - channel["floor"]
         # Of a gap that hardly lies above the floor there is no share worth a number.
         counts = above is not None and channel["after"] is not None and above > 0.1 * channel["floor"]
@@ -297,6 +301,7 @@ def gap(data: Mapping[str, Any]) -> Table:
             ]
         )
     head = {"before": "as given", "calibrated": "calibrated", "after": "with named effects", "floor": "repeats differ by"}
+    head["last"] = head["calibrated"]
     columns = ["channel", *(head[step] for step in steps), *(["gap closed"] if named else []), ""]
     # Nothing is open: there is no column for it.
     return Table(columns, rows, 1) if opened else Table(columns[:-1], [row[:-1] for row in rows], 1)
