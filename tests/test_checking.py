@@ -134,7 +134,22 @@ def test_every_problem_is_listed_with_its_next_step(session: Path, tmp_path: Pat
     ).problems
     # No step leaves every trial out.
     assert [p.next_step for p in lines if "Fy stays at" in p.text] == ["record with a larger range of the sensor"]
-    assert any("50 samples a second, where most trials have 100" in p.text for p in lines)
+    assert any("50 samples a second, where others have 100" in p.text for p in lines)
+
+
+def test_of_two_rates_in_halves_one_that_was_recorded_is_told(session: Path, tmp_path: Path) -> None:
+    """It was: 25 and 50 samples a second, where most trials have 37.5."""
+    halves: dict[str, Change] = {f"slow_{k}": lambda s: s[::2] for k in (1, 2, 3)}
+    told = [p.text for p in check_dataset(changed(session, tmp_path / "halves", halves)).problems if "samples a second" in p.text]
+    assert told and all("50 samples a second, where others have 100" in text for text in told)
+
+
+def test_two_joints_are_not_one_problem_and_one_more() -> None:
+    """It was: joint 1 moves by 0.0011 rad in the fit trials and 1 more: what holds it cannot be told."""
+    of_joints = [Problem("warning", f"joint {k} moves by 0.00{k} rad: what holds it cannot be told", "move it") for k in (1, 2)]
+    assert grouped(of_joints) == of_joints
+    of_files = [Problem("warning", f"trials/slow_{k}.csv: one cause", "look") for k in (1, 2)]
+    assert [p.text for p in grouped(of_files)] == ["trials/slow_1.csv and 1 more: one cause"]
 
 
 def test_the_next_step_fits_the_cell(session: Path, tmp_path: Path) -> None:

@@ -367,12 +367,13 @@ def _clocks(dataset: Dataset, errors: Sequence[str]) -> Iterator[Problem]:
 
 
 def _rates(dataset: Dataset) -> Iterator[Problem]:
-    """Give the trials that are sampled at another rate than most."""
+    """Give the trials that are sampled at another rate than at least half of them."""
     rates = np.array([trial.rate for trial in dataset.trials])
-    usual = float(np.median(rates))
+    # The upper one of two in the middle: the mean of both would be a rate that no trial has.
+    usual = float(np.sort(rates)[rates.size // 2])
     for trial, rate in zip(dataset.trials, rates, strict=True):
         if abs(rate / usual - 1.0) > _SAME_RATE:
-            said = f"{trial.file}: {rate:.4g} samples a second, where most trials have {usual:.4g}"
+            said = f"{trial.file}: {rate:.4g} samples a second, where others have {usual:.4g}"
             yield Problem("warning", said, "record all trials at one rate; lost samples?")
 
 
@@ -380,14 +381,15 @@ def grouped(problems: Sequence[Problem]) -> list[Problem]:
     """Return problems with those together that differ by their file, or by what was measured in it, alone; of such, the first is shown."""
     together: dict[tuple[str, str, str], list[Problem]] = {}
     for p in problems:
-        _, colon, rest = p.text.partition(": ")
-        together.setdefault((p.level, _MEASURED.sub("", rest) if colon else p.text, p.next_step), []).append(p)
+        file, _, rest = p.text.partition(": ")
+        # What stands before a colon may be a joint with its number: that is no file.
+        of_file = file.endswith((".csv", ".parquet"))
+        together.setdefault((p.level, _MEASURED.sub("", rest) if of_file else p.text, p.next_step), []).append(p)
     lines = []
     for alike in together.values():
         first = alike[0]
-        file, colon, rest = first.text.partition(": ")
-        more = f" and {len(alike) - 1} more" if len(alike) > 1 else ""
-        lines.append(replace(first, text=f"{file}{more}: {rest}") if colon else first)
+        file, _, rest = first.text.partition(": ")
+        lines.append(replace(first, text=f"{file} and {len(alike) - 1} more: {rest}") if len(alike) > 1 else first)
     return lines
 
 
@@ -416,7 +418,11 @@ def _abilities(dataset: Dataset, blocked: bool, other_arm: bool) -> tuple[Abilit
         why = "correct the error above first"
         return Ability("identify", False, why), passive, Ability("gap", False, why)
     return (
-        Ability("identify", bool(efforts), f"{len(efforts)} fit trials with forces or torques" if efforts else "no forces and no torques"),
+        Ability(
+            "identify",
+            bool(efforts),
+            f"{len(efforts)} fit trial{'s' if len(efforts) > 1 else ''} with forces or torques" if efforts else "no forces and no torques",
+        ),
         passive,
         Ability("gap", bool(efforts), f"{how}{'; without ' + ' and '.join(lacking) if lacking else ''}"),
     )
