@@ -402,6 +402,17 @@ def test_states_of_opensim_are_angles_and_speeds(recording: Recording, tmp_path:
     assert np.abs(armrs.load_dataset(done.folder).trials[0].q - recording.q).max() < 1e-8
 
 
+def test_forces_of_a_motion_file_are_not_in_degrees(recording: Recording, tmp_path: Path) -> None:
+    """`Fy` of a file that says inDegrees=yes was refused: found 'deg', allowed a unit of force."""
+    names = ["time", "q1", "q2", "Fy", "Fz"]
+    samples = np.column_stack([recording.t, recording.q * DEGREE, recording.force_on_robot])
+    head = f"slow\nversion=1\nnRows={len(samples)}\nnColumns={len(names)}\ninDegrees=yes\nendheader\n"
+    path = write_text(tmp_path / "slow_1.mot", names, samples, sep="\t", above=head)
+    done = armrs.import_recordings([path], tmp_path / "set", model=KNOWN)
+    assert {c.symbol: c.unit for c in done.recipe.channels if c.symbol[0] == "q"} == {"q1": "deg", "q2": "deg"}
+    assert np.abs(armrs.load_dataset(done.folder).trials[0].q - recording.q).max() < 1e-8
+
+
 def _one_turn(r: Recording, folder: Path, wrap: Callable[[np.ndarray], np.ndarray]) -> list[Path]:
     """Two repeats in degrees, which begin at 0 s and 1 s of the recording, as a recorder writes angles that it wraps."""
     made = []

@@ -17,11 +17,11 @@ PARQUET_SUFFIXES = (".parquet",)
 MOTION_SUFFIXES = (".mot", ".sto")
 C3D_SUFFIXES = (".c3d",)
 TRC_SUFFIXES = (".trc",)
-_NO_ANGLE = re.compile(r"force|moment|torque|emg|_[vp][xyz]$|_t[xyz]$|_f[xyz]$", flags=re.IGNORECASE)
+_NO_ANGLE = re.compile(r"force|moment|torque|emg|_[vp][xyz]$|_t[xyz]$|_f[xyz]$|^[fm][xyz](_|$)|^tau\d", flags=re.IGNORECASE)
 """Names of columns that the header's unit of angles does not concern."""
 
-_SPEED = re.compile(r"/speed$|_u$")
-"""Names of speeds in a file of states."""
+_SPEED = re.compile(r"/speed$|_u$|^dq\d")
+"""Names of speeds, in a file of states and as in a trial."""
 
 
 def read_parquet(path: Path) -> RawTable:
