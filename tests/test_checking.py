@@ -15,6 +15,7 @@ import armrs
 from armrs import cli
 from armrs.workflows import demo
 from armrs.workflows.checking import Ability, Checked, Problem, check_dataset, grouped
+from armrs.workflows.gap.suspicion import examine
 from test_import import KNOWN, SI, Recording, recording, repeated, table, write_text
 
 __all__ = ["recording"]
@@ -90,6 +91,8 @@ def test_a_robot_that_stands_elsewhere_than_the_model_says_is_told(tmp_path: Pat
     assert told[0] == [] and len(told[1]) == 1
     # The sensors of the demonstration are off by a millimetre.
     assert re.fullmatch(r"hand and handle: -2[01] mm forward and .[01] mm up from each other on average, allowed 10 mm", told[1][0])
+    # `gap` begins with the same words: it alone would name an effect.
+    assert told[1][0] in examine(dataset.replace(model=moved), led=True)
 
 
 def test_forces_in_kilonewtons_are_not_a_wrong_body_mass_as_well(tmp_path: Path) -> None:

@@ -61,7 +61,7 @@ def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
             for name, values in zip(("Fy", "Fz"), trial.force_on_arm.T, strict=True):
                 level = constant(values)
                 if level is not None:
-                    found, allowed = Text(f"{level:g} N in every sample"), "a force that changes with the movement"
+                    found, allowed = Text(f"{level + 0.0:g} N in every sample"), "a force that changes with the movement"
                     yield BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
 
 

@@ -29,8 +29,6 @@ _LATE, _LATE_BY = 0.06, 2.0
 """Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
 _LONG = 3.0
 """Length of a segment from which on its unit is asked for [m]."""
-_APART = 0.01
-"""Mean distance of hand and handle from which on it is told [m]: ten times the default placement of the handle."""
 _SAME_RATE = 0.02
 _SLOW = 0.3
 """Joint speed up to which a movement counts as slow enough for passive moments [rad/s]."""
@@ -151,7 +149,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     _plausible(dataset, problems)
     tell("conventions", 0.4)
     _balanced(dataset, problems)
-    problems += [*_apart(dataset), *_without_robot(dataset)]
+    problems += _without_robot(dataset)
     tell("clocks", 0.6)
     problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
@@ -218,6 +216,7 @@ _WARNINGS = (
         "correct the unit of the forces and import again, or body mass (armrs init) or masses (model.toml)",
     ),
     ("saturated", "record with a larger range of the sensor, or leave these trials out"),
+    ("hand and handle", "check the bases and lengths of arm and robot in the model, and the zeros of their angles"),
     ("no samples from", "fill the gap or record the movement again; where it was, nothing is compared"),
     ("samples are missing", "record these repeats again, or leave them out"),
     ("bridged", "look for lost samples in the recorder"),
@@ -328,19 +327,6 @@ def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
         problems += [Problem("warning", text, "compare with the other trials") for text in found if text not in said]
 
 
-def _apart(dataset: Dataset) -> list[Problem]:
-    """Return that hand and handle are apart on average: a base or a length is wrong by centimetres, which `gap` would name as an effect.
-
-    A soft contact gives way by millimetres.
-    """
-    gap = plausibility.mean_gap(dataset)
-    if gap is None or float(np.hypot(*gap)) < _APART:
-        return []
-    forward, up = 1e3 * gap
-    text = f"hand and handle: {forward:+.0f} mm forward and {up:+.0f} mm up from each other on average, allowed {1e3 * _APART:.0f} mm"
-    return [Problem("warning", text, "check the bases and lengths of arm and robot in the model, and the zeros of their angles")]
-
-
 def _without_robot(dataset: Dataset) -> list[Problem]:
     """Return that angles of a robot were recorded which nothing can use, since the model does not say where the robot stands."""
     if dataset.model.robot is not None or not any(t.robot_q is not None for t in dataset.trials):
@@ -377,19 +363,24 @@ def _rates(dataset: Dataset) -> Iterator[Problem]:
             yield Problem("warning", said, "record all trials at one rate; lost samples?")
 
 
+def _of_file(problem: Problem) -> tuple[str, str]:
+    """Return the file that a problem is of, empty where it is of none, and the rest of its text."""
+    file, _, rest = problem.text.partition(": ")
+    # What stands before a colon may be a joint with its number: that is no file.
+    return (file, rest) if file.endswith((".csv", ".parquet")) else ("", problem.text)
+
+
 def grouped(problems: Sequence[Problem]) -> list[Problem]:
     """Return problems with those together that differ by their file, or by what was measured in it, alone; of such, the first is shown."""
     together: dict[tuple[str, str, str], list[Problem]] = {}
     for p in problems:
-        file, _, rest = p.text.partition(": ")
-        # What stands before a colon may be a joint with its number: that is no file.
-        of_file = file.endswith((".csv", ".parquet"))
-        together.setdefault((p.level, _MEASURED.sub("", rest) if of_file else p.text, p.next_step), []).append(p)
+        file, rest = _of_file(p)
+        together.setdefault((p.level, _MEASURED.sub("", rest) if file else rest, p.next_step), []).append(p)
     lines = []
     for alike in together.values():
         first = alike[0]
-        file, _, rest = first.text.partition(": ")
-        lines.append(replace(first, text=f"{file} and {len(alike) - 1} more: {rest}") if len(alike) > 1 else first)
+        file, rest = _of_file(first)
+        lines.append(replace(first, text=f"{file} and {len(alike) - 1} more: {rest}") if file and len(alike) > 1 else first)
     return lines
 
 

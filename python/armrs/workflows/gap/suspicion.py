@@ -11,7 +11,7 @@ from ... import _armrs
 from ..._armrs import SimulatedTrial
 from ...errors import BadInput, Text
 from ...io.dataset import Dataset
-from ...io.plausibility import refuse_implausible
+from ...io.plausibility import mean_gap, refuse_implausible
 from ...io.trial import Trial, constant
 from ..setup import examine_setup, other_weight
 from .between_samples import unresolved
@@ -20,6 +20,8 @@ from .core_input import core_settings, core_trials
 _BY_TORQUES = "so all trials are compared by joint torques in measured motion"
 _NOT_TOLD = "The contact, the robot, a first joint that moves, tremor and bursts cannot be tested that way"
 _NO_FORCES = "nor can errors of the force sensor, its misalignment and its delay"
+_APART = 0.01
+"""Mean distance of hand and handle from which on it is told [m]: ten times the default placement of the handle."""
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
 _NEAR = 0.02
@@ -50,8 +52,8 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
 def tests() -> tuple[Callable[[Dataset, bool], list[str]], ...]:
     """Return the tests of `examine`, each by itself: of a data set and whether a robot leads the arm, lines or a refusal."""
     return (
-        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _other_weight, _still_joints, _moving_starts, unresolved,
-        _uneven_repeats, _saturated,
+        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _apart, _other_weight, _still_joints, _moving_starts,
+        unresolved, _uneven_repeats, _saturated,
     )  # fmt: skip
 
 
@@ -80,6 +82,18 @@ def _dead_sensors(dataset: Dataset, led: bool) -> list[str]:
 
 def _wrong_setup(dataset: Dataset, led: bool) -> list[str]:
     return examine_setup(dataset)
+
+
+def _apart(dataset: Dataset, led: bool) -> list[str]:
+    """Return that hand and handle are apart on average: a base or a length is wrong by centimetres, which would be named as an effect.
+
+    A soft contact gives way by millimetres.
+    """
+    gap = mean_gap(dataset)
+    if gap is None or float(np.hypot(*gap)) < _APART:
+        return []
+    forward, up = 1e3 * gap
+    return [f"hand and handle: {forward:+.0f} mm forward and {up:+.0f} mm up from each other on average, allowed {1e3 * _APART:.0f} mm"]
 
 
 def _other_weight(dataset: Dataset, led: bool) -> list[str]:
