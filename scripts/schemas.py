@@ -13,6 +13,7 @@ from typing import Any
 
 from armrs.catalogue import FORCE_CHANNELS, Kind, Parameter, catalogue
 from armrs.workflows.experiment import FAULTS, Controller, Devices, Fault, Safety
+from armrs.workflows.force_sensor import SixAxis
 from armrs.workflows.interaction import Interaction, Perturbation, Support
 
 FOLDER = Path(__file__).parent.parent / "docs" / "schemas"
@@ -207,6 +208,15 @@ def movement(**more: Any) -> Any:
     return table(keys | more) | {"oneOf": [{"required": [f"waypoints_{unit}"]} for unit in units["waypoints"]], "allOf": once}
 
 
+def six_axis() -> Any:
+    """Return the schema of [sensors.six_axis]."""
+    three = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+    row = list_of({"type": "number", "minimum": -0.5, "maximum": 0.5}, least=6, most=6)
+    known = {f.name: three | {"default": f.default} for f in dataclasses.fields(SixAxis) if isinstance(f.default, tuple)}
+    places = {name: pair("in the sensor's frame [m]") for name in ("handle_m", "tool_com_m", "stated_com_m")}
+    return settings(SixAxis, **known | places | {"crosstalk": list_of(row, least=6, most=6, text="shares of the ranges")})
+
+
 def experiment() -> Any:
     """Return the schema of EXPERIMENT.toml."""
     trials = {"type": "integer", "minimum": 0, "maximum": 1000}
@@ -227,7 +237,7 @@ def experiment() -> Any:
             "handle": table({"mass": number("[kg]", least=0.0, most=10.0, default=0.0)}),
             "controller": settings(Controller),
             "safety": settings(Safety),
-            "sensors": settings(Devices),
+            "sensors": settings(Devices, six_axis=six_axis()),
             "variation": table({"moment_Nm": list_of(number("[N m]", least=0.0), text="one a joint")}),
             "tolerance": tolerance(),
             "fault": list_of(fault),

@@ -349,6 +349,8 @@ def recorded(result: Mapping[str, Any], report: Path) -> None:
     show("", tables.recorded(result))
     if said := interacted(result):
         print(f"\n{said}")
+    if lines := saturated(result):
+        print("\n" + "\n".join(lines))
     print("\n" + "\n".join([*result["files"][:3], str(report)]))
 
 
@@ -369,6 +371,16 @@ def interacted(data: Mapping[str, Any]) -> str:
         f"Carried by the model of [support], the arm takes {force:.3g} N at the hand instead of {before:.3g} N (RMS, medians of the runs): "
         f"less by at least {100 * lowered:.3g} %. {end[0].upper() + end[1:]}."
     )
+
+
+def saturated(data: Mapping[str, Any]) -> list[str]:
+    """Return which channels of a six-axis force sensor were at the end of their range, a line a trial."""
+    lines = []
+    for trial in data["trials"]:
+        if counts := trial.get("six_axis", {}).get("saturated"):
+            channels = ", ".join(f"{name.partition('_')[0]} in {tables.how_many(count, 'sample')}" for name, count in counts.items())
+            lines.append(f"{trial['configuration']} {trial['repeat']}: the force sensor is at the end of its range: {channels}.")
+    return lines
 
 
 def planned(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:

@@ -13,9 +13,11 @@ import numpy as np
 
 from .. import checks
 from ..anthropometry import JOINTS, UNCERTAINTY, literature_arm, segments_of
+from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Subject, Tolerance, load_model
+from .force_sensor import SixAxis
 from .interaction import PERIOD, Interaction, Perturbation, Support
 from .movement import Movement, movement_of
 
@@ -89,6 +91,8 @@ class Devices:
         Whether muscle activity is recorded.
     clock_offset_s, clock_drift, clock_jitter_s : float
         Of the clock of the cameras against that of the force sensor: offset, relative rate, noise of a single stamp.
+    six_axis : SixAxis, optional
+        The force sensor behind the robot's last link, in place of the one that reads the contact force alone.
     """
 
     rate_Hz: float = 50.0
@@ -104,6 +108,7 @@ class Devices:
     clock_offset_s: float = 0.0
     clock_drift: float = 0.0
     clock_jitter_s: float = 0.0
+    six_axis: SixAxis | None = None
 
 
 @dataclass(frozen=True)
@@ -275,7 +280,7 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
         runs=runs,
         controller=_settings(Controller, "[controller]", document.get("controller", {})),
         safety=_settings(Safety, "[safety]", margin | checks.table("[safety]", document.get("safety", {}))),
-        devices=_devices(document.get("sensors", {})),
+        devices=_devices(document.get("sensors", {}), truth),
         variation_Nm=np.array([checks.number("[variation], moment_Nm", v, least=0.0, unit="N m") for v in moments]),
         faults=faults,
         tolerance=Tolerance.from_dict(document.get("tolerance", {}), "[tolerance]"),
@@ -443,8 +448,18 @@ _MOST = {
 """Of the deviations: far beyond any device, and small enough that what is recorded are forces and places."""
 
 
-def _devices(table: object) -> Devices:
+def _devices(value: object, truth: Model) -> Devices:
     place = "[sensors]"
+    table = checks.table(place, value)
+    if "six_axis" in table:
+        for key in ("force_noise_N", "force_range_N", "force_bits", "moment_noise_Nm"):
+            if key in table:
+                allowed = "none: [sensors.six_axis] has noise, range and bits of its own"
+                raise BadInput(f"{place}, {key}", Text("a value beside six_axis"), allowed)
+        for effect in truth.effects:
+            if catalogue()[effect.kind].where == "frame":
+                raise BadInput("[sensors.six_axis]", Text(f"the effect {effect.kind}"), "none of the frame: the tool's weight is along −z")
+        table["six_axis"] = _part_of(SixAxis, "[sensors.six_axis]", table["six_axis"])
     made: Devices = _part_of(Devices, place, table)
     checks.whole(f"{place}, force_bits", made.force_bits, least=1, most=52)
     checks.flag(f"{place}, emg", made.emg)

@@ -18,11 +18,13 @@ from ..io import files
 from ..io.dataset import FILE, Dataset, write_dataset
 from ..io.markers import Markers, planar_motion
 from ..io.opensim import write_trc
+from ..io.samples import write_samples
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
 from .driven import CoreRun, driven
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
+from .force_sensor import CHANNELS, RobotMotion
 from .interaction import CONTROL_RATE, Interacted
 from .movement import Movement
 from .simulate import Channel, Sensors, Simulated, simulate
@@ -103,7 +105,8 @@ def record(
     experiment : Experiment or path
         `EXPERIMENT.toml`.
     folder : path
-        Gets the data set, the markers in `markers/`, and the truth in `truth/`, which no other verb reads.
+        Gets the data set, the markers in `markers/`, the readings of a six-axis force sensor in `wrench/`, and the truth in `truth/`,
+        which no other verb reads.
     step : callable
         Called with 1 after each trial.
 
@@ -142,12 +145,15 @@ class Measured:
         What the cameras saw, by the file of the trial.
     interacted : dict of str to tuple of Interacted
         As in `Recorded`.
+    wrench_on_robot : dict of str to ndarray, shape (n, 6)
+        What a six-axis force sensor read, by the file of the trial [N, N m].
     """
 
     dataset: Dataset
     trials: tuple[dict[str, Any], ...]
     markers: dict[str, Markers]
     interacted: dict[str, tuple[Interacted, ...]]
+    wrench_on_robot: dict[str, np.ndarray]
 
 
 def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done: None) -> Measured:
@@ -180,7 +186,8 @@ def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done
         added=_added(experiment.runs, {trial.configuration for trial, _, _ in kept}),
     )
     interacted = {m.trial.file: m.interacted for m in seen if m.trial is not None and m.interacted}
-    return Measured(dataset, tuple(m.story for m in seen), {trial.file: markers for trial, markers, _ in kept}, interacted)
+    wrenches = {m.trial.file: m.wrench_on_robot for m in seen if m.trial is not None and m.wrench_on_robot is not None}
+    return Measured(dataset, tuple(m.story for m in seen), {trial.file: markers for trial, markers, _ in kept}, interacted, wrenches)
 
 
 def check_required(experiment: Experiment) -> None:
@@ -216,6 +223,7 @@ class _Seen:
     markers: Markers | None
     story: dict[str, Any]
     interacted: tuple[Interacted, ...] = ()
+    wrench_on_robot: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,12 +284,14 @@ class _Session:
         rate = RECORDING_RATE if devices.rate_Hz <= RECORDING_RATE else 2.0 * RECORDING_RATE
         true = simulate(model, path, rate=rate, start=run.movement.waypoints[0], sensors=_sensors(devices), seeds=[seed])
         read = true.readings[0]
-        reading = _Reading(true.t, true.q, read.time, read.force_on_arm, read.moment_on_arm, read.robot_q)
+        moved = RobotMotion(true.t, *(true.columns[name] for name in ("robot_q", "robot_qd", "robot_qdd")))
+        force, wrench = self._sense(model, moved, (read.time, read.force_on_arm, read.robot_q), (seed, story))
+        reading = _Reading(true.t, true.q, read.time, force, read.moment_on_arm, read.robot_q)
         trial, markers = self._read(run, repeat, (reading, model), (draw, story))
         if trial is not None:
             tau, emg = _brakes(true, read.time, devices, draw), _emg(true, read.time, draw) if devices.emg else {}
             trial = dataclasses.replace(trial, tau=tau, emg=emg)
-        return _Seen(trial, markers, story)
+        return _Seen(trial, markers, story, wrench_on_robot=wrench)
 
     def _yield(self, model: Model, run: Run, repeat: int, drawn: tuple[np.random.Generator, np.ndarray, int]) -> _Seen:
         """Measure one trial with a handle that yields; where something carries the arm, run it without that as well."""
@@ -308,15 +318,32 @@ class _Session:
             return _Seen(None, None, story, runs)
         stamps = np.arange(0.0, kept.t[-1], 1.0 / devices.rate_Hz)
         force, robot_q = (np.column_stack([np.interp(stamps, kept.t, c) for c in a.T]) for a in (kept.force_on_arm, kept.robot_q))
-        step = 2.0 * devices.force_range_N / 2**devices.force_bits
-        noisy = np.round((force + devices.force_noise_N * draw.standard_normal(force.shape)) / step) * step
-        noisy = np.clip(noisy, -devices.force_range_N, devices.force_range_N)
+        wrench = None
+        if devices.six_axis is None:
+            step = 2.0 * devices.force_range_N / 2**devices.force_bits
+            noisy = np.round((force + devices.force_noise_N * draw.standard_normal(force.shape)) / step) * step
+            force = np.clip(noisy, -devices.force_range_N, devices.force_range_N)
+        else:
+            force, wrench = self._sense(model, RobotMotion.of_angles(kept.t, kept.robot_q), (stamps, force, robot_q), (seed, story))
         moment = (devices.moment_noise_Nm or 0.0) * draw.standard_normal(len(stamps))
-        trial, markers = self._read(run, repeat, (_Reading(kept.t, kept.q, stamps, noisy, moment, robot_q), model), (draw, story))
+        trial, markers = self._read(run, repeat, (_Reading(kept.t, kept.q, stamps, force, moment, robot_q), model), (draw, story))
         if trial is not None and e.support is not None:
             torque = np.column_stack([np.interp(stamps, kept.t, c) for c in kept.support.T])
             trial = dataclasses.replace(trial, tau=torque + (devices.brake_noise_Nm or 0.0) * draw.standard_normal(torque.shape))
-        return _Seen(trial, markers, story, runs)
+        return _Seen(trial, markers, story, runs, wrench)
+
+    def _sense(
+        self, model: Model, moved: RobotMotion, seen: tuple[np.ndarray, np.ndarray, np.ndarray], state: tuple[int, dict[str, Any]]
+    ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return the force on the arm as it is recorded, and what a six-axis sensor read; `seen`: time, force on the arm, robot angles."""
+        sensor, (stamps, force_on_arm, robot_q), (seed, story) = self.experiment.devices.six_axis, seen, state
+        if sensor is None:
+            return force_on_arm, None
+        assert model.robot is not None
+        rig = (model.robot, model.gravity)
+        wrench = sensor.read(rig, moved.at(stamps), -force_on_arm, np.random.default_rng([seed, 4]))
+        story["six_axis"] = {"saturated": sensor.saturated(wrench)}
+        return -sensor.force_on_robot(rig, RobotMotion.of_angles(stamps, robot_q), wrench), wrench
 
     def _lead(self, model: Model, movement: Movement, fault: Fault | None, seed: int) -> _Controlled:
         """Let the robot's controller follow the movement; it is programmed with the true lengths."""
@@ -390,9 +417,11 @@ def _hide(positions: np.ndarray, devices: Devices, draw: np.random.Generator) ->
 
 
 def _sensors(devices: Devices) -> Sensors:
+    # Six axes read the contact force as it is, with the tool.
+    force = Channel(devices.force_noise_N, range=devices.force_range_N, bits=devices.force_bits)
     return Sensors(
         rate=devices.rate_Hz,
-        force=Channel(devices.force_noise_N, range=devices.force_range_N, bits=devices.force_bits),
+        force=force if devices.six_axis is None else Channel(),
         moment=Channel(devices.moment_noise_Nm or 0.0),
         robot=Channel(range=2 * np.pi, bits=24),
     )
@@ -505,7 +534,8 @@ def _former(out: Path) -> set[Path]:
     if not (out / "truth" / "truth.toml").is_file():
         raise BadInput("folder", Text("a data set that armrs record did not write"), "a folder of its own", file=out)
     names = [name for entry in Description.load(out / FILE).trials if (name := Path(entry.file)).parent == Path("trials")]
-    return {out / name for name in names} | {out / "markers" / name.with_suffix(".trc").name for name in names}
+    markers = {out / "markers" / name.with_suffix(".trc").name for name in names}
+    return {out / name for name in names} | markers | {out / "wrench" / name.name for name in names}
 
 
 def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path, ...]:
@@ -516,4 +546,8 @@ def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path,
         out / "truth" / "truth.json", {"experiment": experiment.name, "seed": experiment.seed, "trials": list(measured.trials)}
     )
     written = [write_trc(out / "markers" / Path(file).with_suffix(".trc").name, markers) for file, markers in measured.markers.items()]
+    for file, wrench in measured.wrench_on_robot.items():
+        written.append(out / "wrench" / Path(file).name)
+        times = next(trial.t for trial in measured.dataset.trials if trial.file == file)
+        write_samples(written[-1], ["t_s", *CHANNELS], [times, *wrench.T])
     return (write_dataset(measured.dataset, out), truth, truth.with_suffix(".json"), *written)
