@@ -224,7 +224,8 @@ def record(
 ) -> int:
     """Run an experiment in the virtual laboratory; writes a data set, the markers, and the truth in a folder of its own.
 
-    Exit status 1 when the safety supervisor stopped a trial; that trial is not in the data set.
+    With [sensors.six_axis], the force is made of the readings of a six-axis force sensor, which are in wrench/. Exit status 1 when the
+    safety supervisor stopped a trial; that trial is not in the data set.
     """
     from ..report import words
     from ..report.plain import origin
