@@ -63,6 +63,12 @@ def test_what_the_readers_refuse_is_not(name: str, old: str, new: str, tmp_path:
     assert errors(name, text.replace(old, new, 1), tmp_path)
 
 
+def test_a_six_axis_force_sensor_is_valid_in_an_experiment(tmp_path: Path) -> None:
+    table = SHOWN["of EXPERIMENT.toml"]
+    assert errors("experiment", EXPERIMENT + table, tmp_path) == []
+    assert errors("experiment", EXPERIMENT + table.replace("[0.2, 0.0, 0.1]", "[0.2, 0.0]"), tmp_path)
+
+
 def test_examples_and_measured_rigs_are_valid(data: Path, tmp_path: Path) -> None:
     for folder in ("dfki_a0", "dfki_c1", "pendulum_double"):
         for name in ("model", "dataset"):
