@@ -284,6 +284,7 @@ class _Session:
         rate = RECORDING_RATE if devices.rate_Hz <= RECORDING_RATE else 2.0 * RECORDING_RATE
         true = simulate(model, path, rate=rate, start=run.movement.waypoints[0], sensors=_sensors(devices), seeds=[seed])
         read = true.readings[0]
+        assert read.force_on_arm is not None and read.robot_q is not None
         moved = RobotMotion(true.t, *(true.columns[name] for name in ("robot_q", "robot_qd", "robot_qdd")))
         force, wrench = self._sense(model, moved, (read.time, read.force_on_arm, read.robot_q), (seed, story))
         reading = _Reading(true.t, true.q, read.time, force, read.moment_on_arm, read.robot_q)
