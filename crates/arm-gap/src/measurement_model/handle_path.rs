@@ -1,0 +1,135 @@
+//! The path on which the robot leads the handle, as far as its angles tell it.
+
+use arm_core::Plane;
+
+use crate::GapError;
+use crate::measurement_model::prediction::{Channels, smooth};
+
+/// Bandwidth of the path, in bandwidths of the comparison: a robot that shakes at the edge of the comparison must keep its whole swing, or
+/// its forces are missed by newtons.
+const WIDEST: f64 = 4.0;
+/// Narrower ones, narrowest first, where the angles of the robot are read with noise.
+const NARROWER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
+/// Share of the sampling rate that a band may be: to take little noise away would round what the robot does from one sample to the next.
+const LARGEST: f64 = 0.4;
+/// Share of the sampling rate above which a path is noise, where it is quiet at all.
+const QUIET: f64 = 0.3;
+/// Share of the noise of the force, in power, that noise of the path may become in the contact: more of it would be read as a softer one.
+const HARMLESS: f64 = 0.05;
+/// Most of the power that a narrower band takes away, in that of the noise.
+const NOISE_ALONE: f64 = 2.0;
+
+/// The path of the handle, low-passed without phase.
+///
+/// A stiff contact turns steps of coarse encoders into forces that nobody measured. Where they count, the path keeps the narrowest band
+/// outside of which there is nothing but noise, read off above 0.3 of the sampling rate.
+/// * `forces` - force on the arm along y and z as measured \[N\], and stiffness of the contact along both \[N/m\]
+/// * `band` - of the comparison \[Hz\]
+///
+/// # Errors
+/// As [`smooth`].
+pub(super) fn handle_path(
+    points: &[Plane<f64>],
+    (forces, stiffness): (&[Vec<f64>], Plane<f64>),
+    band: f64,
+    rate: f64,
+) -> Result<Vec<Plane<f64>>, GapError> {
+    let axes: Channels = (0..2)
+        .map(|a| points.iter().map(|p| p[a]).collect())
+        .collect();
+    let within = |factor: f64| factor * band < LARGEST * rate;
+    let noise = densities(&axes, QUIET * rate, rate)?;
+    let of_force = densities(forces, QUIET * rate, rate)?;
+    let counts = |a: usize| stiffness[a] * stiffness[a] * noise[a] > HARMLESS * of_force[a];
+    let mut kept = None;
+    if counts(0) || counts(1) {
+        for factor in NARROWER.into_iter().filter(|&f| within(f)) {
+            let taken = densities(&axes, factor * band, rate)?;
+            if (0..2).all(|a| taken[a] <= NOISE_ALONE * noise[a]) {
+                kept = Some(factor);
+                break;
+            }
+        }
+    }
+    let factor = kept.unwrap_or(WIDEST);
+    if !within(factor) {
+        return Ok(points.to_vec());
+    }
+    let smooth = smooth(&axes, factor * band, rate)?;
+    Ok((0..points.len())
+        .map(|i| [smooth[0][i], smooth[1][i]])
+        .collect())
+}
+
+/// Power of each channel above a cutoff, for each hertz up to half of the sampling rate.
+fn densities(channels: &[Vec<f64>], cutoff: f64, rate: f64) -> Result<Vec<f64>, GapError> {
+    let low = smooth(channels, cutoff, rate)?;
+    let power = |(channel, low): (&Vec<f64>, &Vec<f64>)| {
+        let squares = std::iter::zip(channel, low).map(|(c, l)| (c - l) * (c - l));
+        squares.sum::<f64>() / channel.len() as f64 / (0.5 * rate - cutoff)
+    };
+    Ok(std::iter::zip(channels, &low).map(power).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE: f64 = 100.0;
+
+    /// A movement of 0.2 m within 4 s, with a swing of 6 Hz, and numbers that look random added.
+    fn path(swing: f64, noise: f64) -> Vec<Plane<f64>> {
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 40) as f64 / (1_u64 << 24) as f64 - 0.5
+        };
+        let slow = |t: f64| 0.1 * libm::sin(core::f64::consts::TAU * 0.25 * t);
+        (0..800)
+            .map(|i| {
+                let t = f64::from(i) / RATE;
+                let y = slow(t) + swing * libm::sin(core::f64::consts::TAU * 6.0 * t);
+                [y + noise * random(), 0.5 * slow(t) + noise * random()]
+            })
+            .collect()
+    }
+
+    fn off(led: &[Plane<f64>], from: &[Plane<f64>]) -> f64 {
+        let inner = std::iter::zip(led, from).skip(50).take(700);
+        inner.fold(0.0, |most, (a, b)| f64::max(most, (a[0] - b[0]).abs()))
+    }
+
+    fn led(points: &[Plane<f64>]) -> Vec<Plane<f64>> {
+        let forces: Channels =
+            path(0.0, 1.0)
+                .iter()
+                .map(|p| p.to_vec())
+                .fold(vec![Vec::new(); 2], |mut all, p| {
+                    (0..2).for_each(|a| all[a].push(p[a]));
+                    all
+                });
+        handle_path(points, (&forces, [9000.0; 2]), 5.0, RATE).unwrap()
+    }
+
+    #[test]
+    fn steps_of_coarse_encoders_are_taken_out_and_a_swing_is_kept() {
+        let coarse = 5e-4;
+        let quiet = path(0.0, 0.0);
+        let (as_read, smoothed) = (path(0.0, coarse), led(&path(0.0, coarse)));
+        assert!(off(&as_read, &quiet) > 2.4e-4 && off(&smoothed, &quiet) < 1.7e-4);
+        // Of a swing of 2 mm at 6 Hz next to nothing is lost.
+        assert!(off(&led(&path(2e-3, coarse)), &path(2e-3, 0.0)) < 2.5e-4);
+    }
+
+    #[test]
+    fn fine_encoders_leave_the_widest_band() {
+        let fine = path(2e-3, 1e-7);
+        let axes: Channels = (0..2)
+            .map(|a| fine.iter().map(|p| p[a]).collect())
+            .collect();
+        let widest = smooth(&axes, WIDEST * 5.0, RATE).unwrap();
+        assert!(led(&fine).iter().zip(&widest[0]).all(|(p, w)| p[0] == *w));
+    }
+}
