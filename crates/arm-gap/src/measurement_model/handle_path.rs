@@ -12,7 +12,7 @@ const WIDEST: f64 = 4.0;
 const NARROWER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
 /// Share of the sampling rate that a band may be: to take little noise away would round what the robot does from one sample to the next.
 const LARGEST: f64 = 0.4;
-/// Share of the sampling rate above which a path is noise, where it is quiet at all.
+/// Share of the sampling rate above which the path of the quietest trial is noise.
 const QUIET: f64 = 0.3;
 /// Share of the noise of the force, in power, that noise of the path may become in the contact: more of it would be read as a softer one.
 const HARMLESS: f64 = 0.05;
@@ -22,7 +22,8 @@ const NOISE_ALONE: f64 = 2.0;
 /// The path of the handle, low-passed without phase.
 ///
 /// A stiff contact turns steps of coarse encoders into forces that nobody measured. Where they count, the path keeps the narrowest band
-/// outside of which there is nothing but noise, read off above 0.3 of the sampling rate.
+/// outside of which there is nothing but noise.
+/// * `noise` - see [`path_noise`]
 /// * `forces` - force on the arm along y and z as measured \[N\], and stiffness of the contact along both \[N/m\]
 /// * `band` - of the comparison \[Hz\]
 ///
@@ -30,15 +31,12 @@ const NOISE_ALONE: f64 = 2.0;
 /// As [`smooth`].
 pub(super) fn handle_path(
     points: &[Plane<f64>],
-    (forces, stiffness): (&[Vec<f64>], Plane<f64>),
+    (noise, forces, stiffness): (Plane<f64>, &[Vec<f64>], Plane<f64>),
     band: f64,
     rate: f64,
 ) -> Result<Vec<Plane<f64>>, GapError> {
-    let axes: Channels = (0..2)
-        .map(|a| points.iter().map(|p| p[a]).collect())
-        .collect();
+    let axes = axes_of(points);
     let within = |factor: f64| factor * band < LARGEST * rate;
-    let noise = densities(&axes, QUIET * rate, rate)?;
     let of_force = densities(forces, QUIET * rate, rate)?;
     let counts = |a: usize| stiffness[a] * stiffness[a] * noise[a] > HARMLESS * of_force[a];
     let mut kept = None;
@@ -59,6 +57,31 @@ pub(super) fn handle_path(
     Ok((0..points.len())
         .map(|i| [smooth[0][i], smooth[1][i]])
         .collect())
+}
+
+/// Noise of the path along y and z, in power for each hertz \[m²/Hz\]: what the quietest trial has at the top of its band, where a fast
+/// movement still moves.
+///
+/// * `paths` - with the sampling rate of each \[Hz\]
+///
+/// # Errors
+/// As [`smooth`].
+pub(super) fn path_noise<'a>(
+    paths: impl Iterator<Item = (&'a [Plane<f64>], f64)>,
+) -> Result<Plane<f64>, GapError> {
+    let mut least = [f64::INFINITY; 2];
+    for (points, rate) in paths {
+        let own = densities(&axes_of(points), QUIET * rate, rate)?;
+        for (least, own) in std::iter::zip(&mut least, own) {
+            *least = least.min(own);
+        }
+    }
+    Ok(least)
+}
+
+fn axes_of(points: &[Plane<f64>]) -> Channels {
+    let axis = |a: usize| points.iter().map(|p| p[a]).collect();
+    vec![axis(0), axis(1)]
 }
 
 /// Power of each channel above a cutoff, for each hertz up to half of the sampling rate.
@@ -101,26 +124,42 @@ mod tests {
         inner.fold(0.0, |most, (a, b)| f64::max(most, (a[0] - b[0]).abs()))
     }
 
-    fn led(points: &[Plane<f64>]) -> Vec<Plane<f64>> {
-        let forces: Channels =
-            path(0.0, 1.0)
-                .iter()
-                .map(|p| p.to_vec())
-                .fold(vec![Vec::new(); 2], |mut all, p| {
-                    (0..2).for_each(|a| all[a].push(p[a]));
-                    all
-                });
-        handle_path(points, (&forces, [9000.0; 2]), 5.0, RATE).unwrap()
+    /// Beside a trial that is as noisy and does not swing.
+    fn led(points: &[Plane<f64>], noise: f64) -> Vec<Plane<f64>> {
+        let forces = axes_of(&path(0.0, 1.0));
+        let trials = [points.to_vec(), path(0.0, noise)];
+        let noise = path_noise(trials.iter().map(|t| (&t[..], RATE))).unwrap();
+        handle_path(points, (noise, &forces, [9000.0; 2]), 5.0, RATE).unwrap()
     }
 
     #[test]
     fn steps_of_coarse_encoders_are_taken_out_and_a_swing_is_kept() {
         let coarse = 5e-4;
         let quiet = path(0.0, 0.0);
-        let (as_read, smoothed) = (path(0.0, coarse), led(&path(0.0, coarse)));
+        let (as_read, smoothed) = (path(0.0, coarse), led(&path(0.0, coarse), coarse));
         assert!(off(&as_read, &quiet) > 2.4e-4 && off(&smoothed, &quiet) < 1.7e-4);
         // Of a swing of 2 mm at 6 Hz next to nothing is lost.
-        assert!(off(&led(&path(2e-3, coarse)), &path(2e-3, 0.0)) < 2.5e-4);
+        assert!(off(&led(&path(2e-3, coarse), coarse), &path(2e-3, 0.0)) < 2.5e-4);
+    }
+
+    /// A movement that swings beyond 0.3 of the sampling rate is none, where another trial is quiet.
+    #[test]
+    fn a_fast_movement_is_not_noise() {
+        let shaken: Vec<_> = (0..800)
+            .map(|i| {
+                [
+                    1e-3 * libm::sin(core::f64::consts::TAU * 35.0 * f64::from(i) / RATE),
+                    0.0,
+                ]
+            })
+            .collect();
+        let widest = smooth(&axes_of(&shaken), WIDEST * 5.0, RATE).unwrap();
+        assert!(
+            led(&shaken, 1e-7)
+                .iter()
+                .zip(&widest[0])
+                .all(|(p, w)| p[0] == *w)
+        );
     }
 
     #[test]
@@ -130,6 +169,11 @@ mod tests {
             .map(|a| fine.iter().map(|p| p[a]).collect())
             .collect();
         let widest = smooth(&axes, WIDEST * 5.0, RATE).unwrap();
-        assert!(led(&fine).iter().zip(&widest[0]).all(|(p, w)| p[0] == *w));
+        assert!(
+            led(&fine, 1e-7)
+                .iter()
+                .zip(&widest[0])
+                .all(|(p, w)| p[0] == *w)
+        );
     }
 }

@@ -15,7 +15,7 @@ use arm_sim::{
 use crate::GapError;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::contact_readings::ContactReadings;
-use crate::measurement_model::handle_path::handle_path;
+use crate::measurement_model::handle_path::{handle_path, path_noise};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
@@ -130,8 +130,15 @@ impl<const N: usize> Session<N> {
         let seen = smooth(&raw, band, trial.rate)?;
         let handle = match &trial.handle {
             Some(points) if self.comparison == ComparisonMode::Led => {
+                let paths = self.trials.iter();
+                let noise = path_noise(paths.filter_map(|t| Some((t.handle.as_deref()?, t.rate))))?;
                 let forces = raw.split_at(raw.len() - 2).1;
-                handle_path(points, (forces, self.contact.stiffness), band, trial.rate)?
+                handle_path(
+                    points,
+                    (noise, forces, self.contact.stiffness),
+                    band,
+                    trial.rate,
+                )?
             }
             _ => Vec::new(),
         };
