@@ -1,9 +1,9 @@
 //! The path on which the robot leads the handle, as far as its angles tell it.
 
 use arm_core::Plane;
+use arm_ident::regression::measured_motion::low_pass;
 
 use crate::GapError;
-use crate::measurement_model::prediction::{Channels, smooth};
 
 /// Bandwidth of the path, in bandwidths of the comparison: a robot that shakes at the edge of the comparison must keep its whole swing, or
 /// its forces are missed by newtons.
@@ -28,7 +28,7 @@ const NOISE_ALONE: f64 = 2.0;
 /// * `band` - of the comparison \[Hz\]
 ///
 /// # Errors
-/// As [`smooth`].
+/// [`GapError::Numerics`] for a trial too short for the filters.
 pub(super) fn handle_path(
     points: &[Plane<f64>],
     (noise, forces, stiffness): (Plane<f64>, &[Vec<f64>], Plane<f64>),
@@ -53,7 +53,7 @@ pub(super) fn handle_path(
     if !within(factor) {
         return Ok(points.to_vec());
     }
-    let smooth = smooth(&axes, factor * band, rate)?;
+    let smooth = low_pass(factor * band, rate)?.both_ways_all(&axes)?;
     Ok((0..points.len())
         .map(|i| [smooth[0][i], smooth[1][i]])
         .collect())
@@ -65,7 +65,7 @@ pub(super) fn handle_path(
 /// * `paths` - with the sampling rate of each \[Hz\]
 ///
 /// # Errors
-/// As [`smooth`].
+/// [`GapError::Numerics`] for a trial too short for the filters.
 pub(super) fn path_noise<'a>(
     paths: impl Iterator<Item = (&'a [Plane<f64>], f64)>,
 ) -> Result<Plane<f64>, GapError> {
@@ -79,14 +79,14 @@ pub(super) fn path_noise<'a>(
     Ok(least)
 }
 
-fn axes_of(points: &[Plane<f64>]) -> Channels {
+fn axes_of(points: &[Plane<f64>]) -> Vec<Vec<f64>> {
     let axis = |a: usize| points.iter().map(|p| p[a]).collect();
     vec![axis(0), axis(1)]
 }
 
 /// Power of each channel above a cutoff, for each hertz up to half of the sampling rate.
 fn densities(channels: &[Vec<f64>], cutoff: f64, rate: f64) -> Result<Vec<f64>, GapError> {
-    let low = smooth(channels, cutoff, rate)?;
+    let low = low_pass(cutoff, rate)?.both_ways_all(channels)?;
     let power = |(channel, low): (&Vec<f64>, &Vec<f64>)| {
         let squares = std::iter::zip(channel, low).map(|(c, l)| (c - l) * (c - l));
         squares.sum::<f64>() / channel.len() as f64 / (0.5 * rate - cutoff)
@@ -124,6 +124,11 @@ mod tests {
         inner.fold(0.0, |most, (a, b)| f64::max(most, (a[0] - b[0]).abs()))
     }
 
+    fn widest(points: &[Plane<f64>]) -> Vec<Vec<f64>> {
+        let filter = low_pass(WIDEST * 5.0, RATE).unwrap();
+        filter.both_ways_all(&axes_of(points)).unwrap()
+    }
+
     /// Beside a trial that is as noisy and does not swing.
     fn led(points: &[Plane<f64>], noise: f64) -> Vec<Plane<f64>> {
         let forces = axes_of(&path(0.0, 1.0));
@@ -153,7 +158,7 @@ mod tests {
                 ]
             })
             .collect();
-        let widest = smooth(&axes_of(&shaken), WIDEST * 5.0, RATE).unwrap();
+        let widest = widest(&shaken);
         assert!(
             led(&shaken, 1e-7)
                 .iter()
@@ -165,10 +170,7 @@ mod tests {
     #[test]
     fn fine_encoders_leave_the_widest_band() {
         let fine = path(2e-3, 1e-7);
-        let axes: Channels = (0..2)
-            .map(|a| fine.iter().map(|p| p[a]).collect())
-            .collect();
-        let widest = smooth(&axes, WIDEST * 5.0, RATE).unwrap();
+        let widest = widest(&fine);
         assert!(
             led(&fine, 1e-7)
                 .iter()
