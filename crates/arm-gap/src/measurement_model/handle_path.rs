@@ -37,12 +37,12 @@ pub(super) fn handle_path(
 ) -> Result<Vec<Plane<f64>>, GapError> {
     let axes = axes_of(points);
     let within = |factor: f64| factor * band < LARGEST * rate;
-    let of_force = densities(forces, QUIET * rate, rate)?;
+    let of_force = densities(forces, QUIET * rate, rate, mean)?;
     let counts = |a: usize| stiffness[a] * stiffness[a] * noise[a] > HARMLESS * of_force[a];
     let mut kept = None;
     if counts(0) || counts(1) {
         for factor in NARROWER.into_iter().filter(|&f| within(f)) {
-            let taken = densities(&axes, factor * band, rate)?;
+            let taken = densities(&axes, factor * band, rate, mean)?;
             if (0..2).all(|a| taken[a] <= NOISE_ALONE * noise[a]) {
                 kept = Some(factor);
                 break;
@@ -59,8 +59,8 @@ pub(super) fn handle_path(
         .collect())
 }
 
-/// Noise of the path along y and z, in power for each hertz \[m²/Hz\]: what the quietest trial has at the top of its band, where a fast
-/// movement still moves.
+/// Noise of the path along y and z, in power for each hertz \[m²/Hz\]: what the quietest trial has at the top of its band, half of the time
+/// at least. A fast movement still moves there, and a jolted one for moments.
 ///
 /// * `paths` - with the sampling rate of each \[Hz\]
 ///
@@ -71,7 +71,7 @@ pub(super) fn path_noise<'a>(
 ) -> Result<Plane<f64>, GapError> {
     let mut least = [f64::INFINITY; 2];
     for (points, rate) in paths {
-        let own = densities(&axes_of(points), QUIET * rate, rate)?;
+        let own = densities(&axes_of(points), QUIET * rate, rate, usual)?;
         for (least, own) in std::iter::zip(&mut least, own) {
             *least = least.min(own);
         }
@@ -85,13 +85,32 @@ fn axes_of(points: &[Plane<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Power of each channel above a cutoff, for each hertz up to half of the sampling rate.
-fn densities(channels: &[Vec<f64>], cutoff: f64, rate: f64) -> Result<Vec<f64>, GapError> {
+///
+/// * `typical` - what stands for all squares
+fn densities(
+    channels: &[Vec<f64>],
+    cutoff: f64,
+    rate: f64,
+    typical: impl Fn(Vec<f64>) -> f64,
+) -> Result<Vec<f64>, GapError> {
     let low = low_pass(cutoff, rate)?.both_ways_all(channels)?;
     let power = |(channel, low): (&Vec<f64>, &Vec<f64>)| {
         let squares = std::iter::zip(channel, low).map(|(c, l)| (c - l) * (c - l));
-        squares.sum::<f64>() / channel.len() as f64 / (0.5 * rate - cutoff)
+        typical(squares.collect()) / (0.5 * rate - cutoff)
     };
     Ok(std::iter::zip(channels, &low).map(power).collect())
+}
+
+fn mean(squares: Vec<f64>) -> f64 {
+    squares.iter().sum::<f64>() / squares.len() as f64
+}
+
+/// The mean square of normal deviates with the median of these squares.
+fn usual(mut squares: Vec<f64>) -> f64 {
+    /// Median of the square of a standard normal deviate.
+    const MEDIAN: f64 = 0.4549;
+    let half = squares.len() / 2;
+    *squares.select_nth_unstable_by(half, f64::total_cmp).1 / MEDIAN
 }
 
 #[cfg(test)]
@@ -165,6 +184,21 @@ mod tests {
                 .zip(&widest[0])
                 .all(|(p, w)| p[0] == *w)
         );
+    }
+
+    /// Nor is one that is jolted, though all are.
+    #[test]
+    fn a_jolted_movement_is_not_noise() {
+        let jolted: Vec<_> = path(0.0, 0.0)
+            .into_iter()
+            .enumerate()
+            .map(|(i, p)| [p[0] + 1e-3 * f64::from(u8::from(i % 200 == 100)), p[1]])
+            .collect();
+        let noise = path_noise([(&jolted[..], RATE)].into_iter()).unwrap();
+        let forces = axes_of(&path(0.0, 1.0));
+        let led = handle_path(&jolted, (noise, &forces, [9000.0; 2]), 5.0, RATE).unwrap();
+        let widest = widest(&jolted);
+        assert!(led.iter().zip(&widest[0]).all(|(p, w)| p[0] == *w));
     }
 
     #[test]

@@ -39,9 +39,6 @@ pub struct Finding<const N: usize> {
     pub scale: f64,
 }
 
-/// Times that the base is judged, and what is named beside it once more.
-const TURNS: usize = 3;
-
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Judges the passive base, and measures what is left.
     pub(crate) fn concluded(
@@ -113,39 +110,35 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Judges the base, and what is named beside it once more where that changes: a spring over two joints that is named brings back the
-    /// springs of both joints, and what had stood for them is left over. What stood behind what is lost is searched for.
+    /// springs of both joints, and what had stood for them is left over.
     fn judged_with_base(
         &mut self,
         (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
     ) -> Result<(SearchState<'a, N>, Vec<Named>, Vec<BaseLaw<N>>), GapError> {
-        for turn in 1.. {
-            progress("judging the passive base", 0.88)?;
-            let asked = state.current.asked.clone();
-            let found = (asked.clone(), self.dropped.clone());
-            let settled = self.afresh((state.current, state.point));
-            let settled = self.with_friction_at_rest(settled)?;
+        progress("judging the passive base", 0.88)?;
+        let found = (state.current.asked.clone(), self.dropped.clone());
+        let settled = self.afresh((state.current, state.point));
+        let mut settled = self.with_friction_at_rest(settled)?;
+        let base = loop {
             let (with_base, base) = self.judged_base(settled, state.scale)?;
-            (state.current, state.point) =
-                self.pruned(with_base, &state.calibrated, state.scale)?;
-            if is_as_judged(&found, &(state.current.asked.clone(), self.dropped.clone())) {
-                return Ok((state, named, base));
+            let before = with_base.0.asked.len();
+            settled = self.pruned(with_base, &state.calibrated, state.scale)?;
+            if settled.0.asked.len() == before {
+                break base;
             }
-            if turn < TURNS && self.repeated && state.bar_lost(asked) {
-                state = self.search_on(state, periodic, progress)?;
-            }
+        };
+        (state.current, state.point) = settled;
+        if !is_as_judged(&found, &(state.current.asked.clone(), self.dropped.clone())) {
             (state.current, state.point, named) = self.judged(
                 (state.current, state.point),
                 &state.calibrated,
                 (state.asked, state.scale, periodic),
                 progress,
             )?;
-            if turn == TURNS {
-                return Ok((state, named, base));
-            }
         }
-        unreachable!("the last turn returns")
+        Ok((state, named, base))
     }
 
     /// The amended model refitted with the noise of all fitted trials, and how well it is known then.

@@ -148,7 +148,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Goes on looking from what was found.
-    pub(crate) fn search_on(
+    fn search_on(
         &mut self,
         mut state: SearchState<'a, N>,
         periodic: Option<[f64; 2]>,
