@@ -10,7 +10,8 @@ use crate::GapError;
 const WIDEST: f64 = 4.0;
 /// Narrower ones, narrowest first, where the angles of the robot are read with noise.
 const NARROWER: [f64; 4] = [1.0, 1.4, 2.0, 2.8];
-/// Share of the sampling rate that a band may be: to take little noise away would round what the robot does from one sample to the next.
+/// Share of the sampling rate that the widest band may be: where samples hold hardly more, the path is as it is, for to take little noise
+/// away would round what the robot does from one sample to the next.
 const LARGEST: f64 = 0.4;
 /// Share of the sampling rate above which the path of the quietest trial is noise.
 const QUIET: f64 = 0.3;
@@ -35,13 +36,15 @@ pub(super) fn handle_path(
     band: f64,
     rate: f64,
 ) -> Result<Vec<Plane<f64>>, GapError> {
+    if WIDEST * band >= LARGEST * rate {
+        return Ok(points.to_vec());
+    }
     let axes = axes_of(points);
-    let within = |factor: f64| factor * band < LARGEST * rate;
     let of_force = densities(forces, QUIET * rate, rate, mean)?;
     let counts = |a: usize| stiffness[a] * stiffness[a] * noise[a] > HARMLESS * of_force[a];
     let mut kept = None;
     if counts(0) || counts(1) {
-        for factor in NARROWER.into_iter().filter(|&f| within(f)) {
+        for factor in NARROWER {
             let taken = densities(&axes, factor * band, rate, mean)?;
             if (0..2).all(|a| taken[a] <= NOISE_ALONE * noise[a]) {
                 kept = Some(factor);
@@ -50,9 +53,6 @@ pub(super) fn handle_path(
         }
     }
     let factor = kept.unwrap_or(WIDEST);
-    if !within(factor) {
-        return Ok(points.to_vec());
-    }
     let smooth = low_pass(factor * band, rate)?.both_ways_all(&axes)?;
     Ok((0..points.len())
         .map(|i| [smooth[0][i], smooth[1][i]])
