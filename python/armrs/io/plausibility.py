@@ -102,7 +102,7 @@ def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarra
     handle = handle_path(robot, robot_q) - base
     found: list[tuple[float, Reading | None]] = [
         (_rms(hand_path(model, reading.angles(q)) - handle), reading)
-        for reading in (*readings.of_angles(q.shape[1]), *readings.of_unit_of_one(q.shape[1]))
+        for reading in (*readings.of_angles(q.shape[1]), *readings.of_unit_of_one(q))
     ]
     tip = hand_path(model, q) + base
     found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]

@@ -71,10 +71,12 @@ def _of_one_joint(n: int, joint: int) -> Iterator[Reading]:
         yield Reading(f"column {name}", between, turn, np.pi * np.eye(n)[joint])
 
 
-def of_unit_of_one(n: int) -> Iterator[Reading]:
-    """Give the angle of one joint of several in the other unit."""
+def of_unit_of_one(q: np.ndarray) -> Iterator[Reading]:
+    """Give the angle of one joint of several in the other unit, where it turns beyond a turn or hardly at all; angles of shape (n, n_joints)."""
+    n = q.shape[1]
     for j in range(n) if n > 1 else ():
-        yield from _other_unit(f"column q{j + 1}", n, j)
+        if not np.radians(3.6) < np.nanmax(np.abs(q[:, j])) < 2.0 * np.pi:
+            yield from _other_unit(f"column q{j + 1}", n, j)
 
 
 def of_robot_angles() -> Iterator[Reading]:
