@@ -72,7 +72,7 @@ def _of_one_joint(n: int, joint: int) -> Iterator[Reading]:
 
 
 def of_unit_of_one(q: np.ndarray) -> Iterator[Reading]:
-    """Give the angle of one joint of several in the other unit, where it turns beyond a turn or hardly at all; angles of shape (n, n_joints)."""
+    """Give the angle of one joint of several in the other unit, where it exceeds a turn or hardly turns; `q` of shape (n, n_joints)."""
     n = q.shape[1]
     for j in range(n) if n > 1 else ():
         if not np.radians(3.6) < np.nanmax(np.abs(q[:, j])) < 2.0 * np.pi:
