@@ -412,7 +412,7 @@ def _abilities(dataset: Dataset, blocked: bool, other_arm: bool) -> tuple[Abilit
         Ability(
             "identify",
             bool(efforts),
-            f"{len(efforts)} fit trial{'s' if len(efforts) > 1 else ''} with forces or torques" if efforts else "no forces and no torques",
+            f"{how_many(len(efforts), 'fit trial')} with forces or torques" if efforts else "no forces and no torques",
         ),
         passive,
         Ability("gap", bool(efforts), f"{how}{'; without ' + ' and '.join(lacking) if lacking else ''}"),

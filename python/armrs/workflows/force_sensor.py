@@ -135,8 +135,7 @@ class SixAxis:
         misread = (wrench / self.limits) @ np.array(self.crosstalk).T * self.limits
         constant = np.array([*self.bias_N, *self.bias_Nm]) + np.outer(motion.t - motion.t[0], [*self.drift_N_s, *self.drift_Nm_s])
         read = wrench + misread + constant + np.array([*self.noise_N, *self.noise_Nm]) * noise.standard_normal(wrench.shape)
-        step = 2.0 * self.limits / 2**self.bits
-        return np.clip(np.round(read / step) * step, -self.limits, self.limits)
+        return digitised(read, self.limits, self.bits)
 
     def force_on_robot(self, rig: tuple[Robot, float], motion: RobotMotion, wrench: np.ndarray) -> np.ndarray:
         """Return the force of the arm on the robot that a laboratory makes of the readings, y and z, shape (n, 2) [N].
@@ -166,6 +165,12 @@ class SixAxis:
         """Return how many samples of which channels are at the end of their range."""
         counts = (np.abs(wrench) >= self.limits).sum(axis=0)
         return {name: int(count) for name, count in zip(CHANNELS, counts, strict=True) if count}
+
+
+def digitised(values: np.ndarray, largest: np.ndarray | float, bits: int) -> np.ndarray:
+    """Return values as a converter gives them that has so many bits over the range from `-largest` to `largest`, beyond which it clips."""
+    step = 2.0 * largest / 2**bits
+    return np.clip(np.round(values / step) * step, -largest, largest)
 
 
 def _load_on_robot(rig: tuple[Robot, float], motion: RobotMotion, mass: float, from_handle: complex) -> np.ndarray:

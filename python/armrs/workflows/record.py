@@ -24,7 +24,7 @@ from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
 from .driven import CoreRun, driven
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
-from .force_sensor import CHANNELS, RobotMotion
+from .force_sensor import CHANNELS, RobotMotion, digitised
 from .interaction import CONTROL_RATE, Interacted
 from .movement import Movement
 from .simulate import Channel, Sensors, Simulated, simulate
@@ -321,9 +321,8 @@ class _Session:
         force, robot_q = (np.column_stack([np.interp(stamps, kept.t, c) for c in a.T]) for a in (kept.force_on_arm, kept.robot_q))
         wrench = None
         if devices.six_axis is None:
-            step = 2.0 * devices.force_range_N / 2**devices.force_bits
-            noisy = np.round((force + devices.force_noise_N * draw.standard_normal(force.shape)) / step) * step
-            force = np.clip(noisy, -devices.force_range_N, devices.force_range_N)
+            noisy = force + devices.force_noise_N * draw.standard_normal(force.shape)
+            force = digitised(noisy, devices.force_range_N, devices.force_bits)
         else:
             force, wrench = self._sense(model, RobotMotion.of_angles(kept.t, kept.robot_q), (stamps, force, robot_q), (seed, story))
         moment = (devices.moment_noise_Nm or 0.0) * draw.standard_normal(len(stamps))
@@ -547,8 +546,8 @@ def _write(measured: Measured, experiment: Experiment, out: Path) -> tuple[Path,
         out / "truth" / "truth.json", {"experiment": experiment.name, "seed": experiment.seed, "trials": list(measured.trials)}
     )
     written = [write_trc(out / "markers" / Path(file).with_suffix(".trc").name, markers) for file, markers in measured.markers.items()]
-    for file, wrench in measured.wrench_on_robot.items():
-        written.append(out / "wrench" / Path(file).name)
-        times = next(trial.t for trial in measured.dataset.trials if trial.file == file)
-        write_samples(written[-1], ["t_s", *CHANNELS], [times, *wrench.T])
+    for trial in measured.dataset.trials:
+        if (wrench := measured.wrench_on_robot.get(trial.file)) is not None:
+            written.append(out / "wrench" / Path(trial.file).name)
+            write_samples(written[-1], ["t_s", *CHANNELS], [trial.t, *wrench.T])
     return (write_dataset(measured.dataset, out), truth, truth.with_suffix(".json"), *written)

@@ -14,7 +14,7 @@ from ...report.figures import Drawn
 from ...report.sketch import sketch
 from ...report.tables import number, spread, unit
 from .found import GapFound
-from .headline import largest, still_open
+from .headline import largest, left, still_open
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,12 +99,13 @@ def shrinking(result: GapFound, gaps: Mapping[str, ChannelGap], ax: Axes) -> Non
     named = any(e.trial is None for e in result.effects)
     steps = list(STEPS) if named else ["before", "calibrated"]
     floors = all(g.floor for g in gaps.values())
-    opened = still_open(result.to_dict() | {"data": {"joints": []}})
+    told = result.to_dict()
+    opened = still_open(told | {"data": {"joints": []}})
     largest = 1.0
     for row, (name, gap) in enumerate(gaps.items()):
         one = (gap.floor if floors else gap.calibrated) or 1.0
         # Where nothing was named, the calibrated model is that of the last fit, as in the headline.
-        last = gap.calibrated if named or gap.after is None else gap.after
+        last = gap.calibrated if named else left(told["gap"][name])
         values = [(step, last if step == "calibrated" else getattr(gap, step)) for step in steps]
         seen = [(step, value / one) for step, value in values if value is not None]
         largest = max(largest, *(value for _, value in seen))
