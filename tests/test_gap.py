@@ -296,10 +296,11 @@ def test_what_a_trial_without_robot_angles_costs_is_said(tmp_path: Path, capsys:
 
 def test_without_repeats_a_movement_that_separates_rivals_is_found() -> None:
     """The samples of a planned movement weigh the same, however those of the trials that were made weigh."""
-    data = session(armrs.Effect("stribeck", 2, parameters={"torque": 0.3, "speed": 0.2}))
-    found = armrs.find_gap(data.replace(trials=tuple(t for t in data.trials if t.repeat in (1, 4))), threads=2)
-    assert found.effects[0].kind == "stribeck" and found.effects[0].joint == 2
-    assert any(a.separating_movement for e in found.effects for a in e.alternatives)
+    data = session(armrs.Effect("coulomb", 2, parameters={"torque": 0.3}))
+    at_one_speed = tuple(t for t in data.trials if t.configuration == "slow" and t.repeat in (1, 4))
+    [effect] = armrs.find_gap(data.replace(trials=at_one_speed), threads=2).effects
+    assert effect.kind == "coulomb" and effect.joint == 2
+    assert any(a.separating_movement for a in effect.alternatives)
 
 
 def test_a_trial_that_begins_while_the_robot_moves_is_warned_of() -> None:

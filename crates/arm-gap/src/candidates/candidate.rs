@@ -77,6 +77,14 @@ impl Candidate {
         self.effect.kind == effect.kind && self.effect.index == effect.index
     }
 
+    /// Whether it is a law of the same family in the same joint.
+    pub fn is_of_family_in_joint(&self, effect: &Effect<f64>) -> bool {
+        let own = &self.effect;
+        own.kind.info().place == Place::Joint
+            && (own.kind.family(), own.index, own.kind.crosses())
+                == (effect.kind.family(), effect.index, effect.kind.crosses())
+    }
+
     /// Whether it asks the same, in whatever shape.
     pub fn is_same_question(&self, other: &Self) -> bool {
         self.is_same_effect(&other.effect) && self.question == other.question
@@ -287,4 +295,20 @@ pub(super) fn expected<const N: usize>(
     let size = size.map(|sd| (0, [0.0, sd]));
     let shapes = part.expected.iter().copied();
     size.into_iter().chain(shapes).map(Free::expected).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_laws_of_a_family_in_one_joint_are_kin() {
+        let end = Candidate::about(Effect::new(Kind::EndRange, 1));
+        let is_kin = |kind, index| end.is_of_family_in_joint(&Effect::new(kind, index));
+        assert!(is_kin(Kind::CubicElastic, 1) && is_kin(Kind::EndRange, 1));
+        assert!(!is_kin(Kind::CubicElastic, 0) && !is_kin(Kind::Coulomb, 1));
+        // A sensor is no joint, whatever its channel's number is.
+        let bias = Candidate::about(Effect::new(Kind::ForceBias, 1));
+        assert!(!bias.is_of_family_in_joint(&Effect::new(Kind::ForceBias, 1)));
+    }
 }

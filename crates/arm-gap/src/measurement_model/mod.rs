@@ -3,6 +3,7 @@
 mod base_path;
 mod compared;
 mod contact_readings;
+mod handle_path;
 pub mod hypothesis;
 pub mod in_trial;
 pub mod joint_torques;

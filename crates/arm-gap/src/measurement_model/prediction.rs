@@ -15,6 +15,7 @@ use arm_sim::{
 use crate::GapError;
 use crate::data::session::{ComparisonMode, Session};
 use crate::measurement_model::contact_readings::ContactReadings;
+use crate::measurement_model::handle_path::{handle_path, path_noise};
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 
 /// Channels of one trial, each with one value a sample; angles first, then forces on the arm, or joint torques.
@@ -25,9 +26,6 @@ pub type Channels = Vec<Vec<f64>>;
 /// Torques as well: an inverse dynamics of encoder angles that is low-passed as a whole is the equation of motion tested against smooth
 /// functions, so that what two differentiations add above the band drops out.
 pub(crate) const BAND: f64 = 5.0;
-/// Bandwidth of the handle's path, in bandwidths of the comparison: a robot that shakes at the edge of the comparison must
-/// keep its whole swing, or its forces are missed by newtons.
-const HANDLE_BAND: f64 = 4.0;
 /// Steps that are tried, longest first \[s\]; the last one is taken even where dry friction would like it shorter.
 pub(crate) const STEPS: [f64; 4] = [2e-3, 1e-3, 5e-4, 2.5e-4];
 /// Least rate at which a run is recorded that sensors read \[Hz\]: what a delayed sensor reads lies between samples, where few of them
@@ -132,7 +130,15 @@ impl<const N: usize> Session<N> {
         let seen = smooth(&raw, band, trial.rate)?;
         let handle = match &trial.handle {
             Some(points) if self.comparison == ComparisonMode::Led => {
-                smooth_path(points, HANDLE_BAND * band, trial.rate)?
+                let paths = self.trials.iter();
+                let noise = path_noise(paths.filter_map(|t| Some((t.handle.as_deref()?, t.rate))))?;
+                let forces = raw.split_at(raw.len() - 2).1;
+                handle_path(
+                    points,
+                    (noise, forces, self.contact.stiffness),
+                    band,
+                    trial.rate,
+                )?
             }
             _ => Vec::new(),
         };
@@ -379,21 +385,6 @@ fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, 
     angles.speed = None;
     let quiet = is_quiet(&relative_speed_noise(&[&angles], band)?);
     Ok(measured(if quiet { &angles } else { trial }, band)?)
-}
-
-/// The path of the handle \[m\] without what is above a band \[Hz\]; as it is where samples hold hardly more than the band: to take
-/// little noise away there would round what the robot does from one sample to the next.
-fn smooth_path(points: &[Plane<f64>], band: f64, rate: f64) -> Result<Vec<Plane<f64>>, GapError> {
-    /// Share of the sampling rate that a band may be.
-    const LARGEST: f64 = 0.4;
-    if band >= LARGEST * rate {
-        return Ok(points.to_vec());
-    }
-    let axis = |a: usize| points.iter().map(|p| p[a]).collect::<Vec<_>>();
-    let smooth = smooth(&[axis(0), axis(1)], band, rate)?;
-    Ok((0..points.len())
-        .map(|i| [smooth[0][i], smooth[1][i]])
-        .collect())
 }
 
 /// Low-passes every channel without phase.

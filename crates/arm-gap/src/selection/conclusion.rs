@@ -3,6 +3,7 @@
 use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
+use crate::candidates::candidate::Candidate;
 use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
@@ -42,31 +43,22 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Judges the passive base, and measures what is left.
     pub(crate) fn concluded(
         &mut self,
-        (state, mut named): (SearchState<'a, N>, Vec<Named>),
+        (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
         mut apart: SetApart<N>,
         progress: Progress<'_>,
     ) -> Result<Finding<N>, GapError> {
+        let base;
+        (state, named, base) = self.judged_with_base((state, named), apart.periodic, progress)?;
         let SearchState {
             mut calibrated,
             mut before,
-            current,
+            current: mut amended,
             point,
             search_trace,
             ruled,
-            asked,
             scale,
             ..
         } = state;
-        progress("judging the passive base", 0.88)?;
-        let found = current.asked.len();
-        let settled = self.afresh((current, point));
-        let settled = self.with_friction_at_rest(settled)?;
-        let ((mut amended, mut point), base) = self.judged_base(settled, scale)?;
-        if amended.asked.len() > found {
-            let judging = (asked, scale, apart.periodic);
-            (amended, point, named) =
-                self.judged((amended, point), &calibrated, judging, progress)?;
-        }
         progress("measuring what is left", 0.9)?;
         let alone = self.precision(&point, &amended, scale)?;
         let mut precision = widened(
@@ -117,6 +109,38 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
+    /// Judges the base, and what is named beside it once more where that changes: a spring over two joints that is named brings back the
+    /// springs of both joints, and what had stood for them is left over.
+    fn judged_with_base(
+        &mut self,
+        (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
+        periodic: Option<[f64; 2]>,
+        progress: Progress<'_>,
+    ) -> Result<(SearchState<'a, N>, Vec<Named>, Vec<BaseLaw<N>>), GapError> {
+        progress("judging the passive base", 0.88)?;
+        let found = (state.current.asked.clone(), self.dropped.clone());
+        let settled = self.afresh((state.current, state.point));
+        let mut settled = self.with_friction_at_rest(settled)?;
+        let base = loop {
+            let (with_base, base) = self.judged_base(settled, state.scale)?;
+            let before = with_base.0.asked.len();
+            settled = self.pruned(with_base, &state.calibrated, state.scale)?;
+            if settled.0.asked.len() == before {
+                break base;
+            }
+        };
+        (state.current, state.point) = settled;
+        if !is_as_judged(&found, &(state.current.asked.clone(), self.dropped.clone())) {
+            (state.current, state.point, named) = self.judged(
+                (state.current, state.point),
+                &state.calibrated,
+                (state.asked, state.scale, periodic),
+                progress,
+            )?;
+        }
+        Ok((state, named, base))
+    }
+
     /// The amended model refitted with the noise of all fitted trials, and how well it is known then.
     ///
     /// Of slow noise the differences of few repeats hold few independent samples, and what they say of it is what they happen to.
@@ -164,6 +188,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.in_trials((&amended.hypothesis, &rhythms)),
         ])
     }
+}
+
+/// Whether the named effects and the laws of the base that are dropped are those that were judged.
+fn is_as_judged(found: &(Vec<Candidate>, Vec<bool>), now: &(Vec<Candidate>, Vec<bool>)) -> bool {
+    let same = |(a, b): (&Candidate, &Candidate)| a.is_same_question(b);
+    found.1 == now.1 && found.0.len() == now.0.len() && std::iter::zip(&found.0, &now.0).all(same)
 }
 
 /// What is known of the numbers, less what the laws may miss.
@@ -222,4 +252,26 @@ fn share_out(named: &mut [Named], explained: f64) {
         one.share = (one.gain / f64::max(all, one.gain)).min(1.0);
     }
     named.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.slot.cmp(&b.slot)));
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    #[test]
+    fn what_was_judged_is_judged_again_where_effects_or_dropped_laws_are_others() {
+        let question = |kind| Candidate::about(Effect::new(kind, 1));
+        let found = (vec![question(Kind::Biarticular)], vec![true, false]);
+        assert!(is_as_judged(&found, &found.clone()));
+        let more = vec![question(Kind::Biarticular), question(Kind::Inertia)];
+        assert!(!is_as_judged(&found, &(more, found.1.clone())));
+        let other = vec![question(Kind::Inertia)];
+        assert!(!is_as_judged(&found, &(other, found.1.clone())));
+        assert!(!is_as_judged(
+            &found,
+            &(found.0.clone(), vec![false, false])
+        ));
+    }
 }

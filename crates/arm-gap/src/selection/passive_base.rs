@@ -225,14 +225,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Laws of the base that were dropped, in the place of a named effect of their joint with shapes of its own, where that shows no more
-    /// than they do: a reflex without threshold and latency is a viscosity. `None` where nothing is.
+    /// than they do: a reflex without threshold and latency is a viscosity, and a spring over two joints that turns one of them alone is a
+    /// spring of that one. `None` where nothing is.
     pub(crate) fn with_base_instead(
         &mut self,
         current: &Fitted<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
         let (before, first) = (self.dropped.clone(), self.session.effects.len());
         for (slot, own) in current.asked.iter().enumerate() {
-            let in_joint = own.kind().info().place == Place::Joint && own.shapes() > 0.0;
+            let crosses = own.kind().crosses();
+            let in_joint =
+                own.kind().info().place == Place::Joint && (own.shapes() > 0.0 || crosses);
             let (mut start, mut asked) = (current.hypothesis.clone(), current.asked.clone());
             let instead = start.named.remove(slot);
             asked.remove(slot);
@@ -251,7 +254,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             if !back {
                 continue;
             }
-            let price = self.price_of_shapes(std::slice::from_ref(own));
+            let shapes = self.price_of_shapes(std::slice::from_ref(own));
+            let price = if crosses {
+                own.price * own.spread
+            } else {
+                shapes
+            };
             if let Ok((fitted, point)) = self.settle(start, asked)
                 && fitted.cost < current.cost + price
             {

@@ -311,8 +311,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 let candidate = &library.candidates[c];
                 let same = |other: &Candidate| other.is_same_question(candidate);
                 let is_plainer = |other: &Candidate| other.is_same_effect(&candidate.effect);
+                // Families before members: two laws of a family bend to what one of them shows. A second one is asked for in a round of its own.
+                let is_kin = |other: &Candidate| {
+                    same(other) || other.is_of_family_in_joint(&candidate.effect)
+                };
                 !current.asked.iter().any(same)
-                    && !members.iter().any(|&m| same(&library.candidates[m]))
+                    && !members.iter().any(|&m| is_kin(&library.candidates[m]))
                     && !converged.plainer.iter().any(is_plainer)
             };
             let choices = score_test.search(&[], AHEAD.min(room), WIDTH, &fresh);
