@@ -34,10 +34,20 @@ impl<const N: usize> PreparedSession<'_, N> {
         self.cut();
         if (compared(self) as f64) < LEAST_LEFT * before as f64 {
             // Then some joint rests at any time, and imperfect samples are better than none.
-            self.resting.clear();
-            self.cut();
+            self.compare_rest();
         }
         true
+    }
+
+    /// Whether nothing holds any joint of a hypothesis, though rest is left out: what did showed at rest alone.
+    pub(crate) fn leaves_out_rest_for_nothing(&self, hypothesis: &Hypothesis<N>) -> bool {
+        !self.resting.is_empty() && dry_joints(hypothesis) == [false; N]
+    }
+
+    /// Compares rest as motion, until other joints are dry.
+    pub(crate) fn compare_rest(&mut self) {
+        self.resting.clear();
+        self.cut();
     }
 
     /// What the rest of joints with dry friction takes from the comparison of a movement.

@@ -181,7 +181,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let asked = settled.0.asked.clone();
             (state.current, state.point) = self.pruned(settled, &state.calibrated, state.scale)?;
             if self.leave_out_rest(&state.point) {
-                state = self.renewed(state)?;
+                state = self.renewed_without_rest(state)?;
             }
             if state.is_back(self.dry) {
                 state.search_trace.pop();
@@ -228,6 +228,20 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         (state.current, state.point) = self.pruned(revived, &state.calibrated, state.scale)?;
         self.search_on(state, periodic, progress)
+    }
+
+    /// What was found, after rest has been left out. Stribeck's law is gone where joints move: where that leaves no dry law, rest is compared
+    /// again, since it alone tells what was found.
+    fn renewed_without_rest(
+        &mut self,
+        state: SearchState<'a, N>,
+    ) -> Result<SearchState<'a, N>, GapError> {
+        let renewed = self.renewed(state.clone())?;
+        if !self.leaves_out_rest_for_nothing(&renewed.current.hypothesis) {
+            return Ok(renewed);
+        }
+        self.compare_rest();
+        self.renewed(state)
     }
 
     /// What was found, after the data that are compared have changed.
