@@ -6,6 +6,7 @@ use super::{Equation, Measured, Needed};
 use crate::effect::{Effect, Kind, Motion, States, UnitTorques, resisting_torque};
 use crate::kinematics::to_links;
 use crate::regressor::link_columns;
+use crate::unroll::each;
 use crate::{Joints, Pose, Scalar, joint_force, joints, static_torque};
 
 impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P, E> {
@@ -83,7 +84,8 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         for j in 0..N {
             rows.known[j] = self.chain.rotor[j] * qdd[j];
         }
-        for k in 0..N {
+        // Written out: most of what a link adds is zero.
+        each!(k in 0, N => {
             let [x, h, inertia] = link_columns(&self.chain, pose, moving, k);
             for (j, row) in rows.columns.iter_mut().enumerate() {
                 for (place, column) in [(k, &x), (N + k, &inertia)] {
@@ -93,7 +95,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
                 }
                 rows.known[j] += h[j] * self.chain.h[k];
             }
-        }
+        });
     }
 
     /// The motion with what effects feel of the forces through the joints.

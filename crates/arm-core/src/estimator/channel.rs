@@ -274,7 +274,7 @@ impl Checks {
         from_fn(|i| self.passed_one(&mut channels[i], values.map(|v| v[i]), farthest, cutoff))
     }
 
-    #[inline(never)]
+    #[inline]
     fn passed_one<T: Real>(
         &mut self,
         channel: &mut Channel<T>,
