@@ -150,9 +150,9 @@ def test_a_law_of_ones_own_is_refused_by_name() -> None:
     """What Python computes no device can: neither the export nor what stands for the device here takes it."""
     armrs.own_effect("thick_oil", lambda q, qd, viscosity: viscosity * qd, [armrs.Parameter("viscosity", "N m s", 0.0, 5.0, 0.0)])
     model = true_model().replace(effects=(Effect("thick_oil", 1, parameters={"viscosity": 0.3}),))
-    for use in (export_c, online.default_settings, online.Estimator, online.Compensation):
+    for use in (export_c, online.Compensation, lambda m: online.default_settings(m, 0.001)):
         with pytest.raises(BadInput, match="thick_oil"):
-            use(model, 0.001) if use is online.default_settings else use(model)
+            use(model)
 
 
 def _value(parameter: armrs.catalogue.Parameter) -> float:  # type: ignore[name-defined]
