@@ -3,22 +3,20 @@
 # host-double, and runs it (in QEMU); prints what it prints. Exits with 77 and the reason where a tool is missing.
 #   scripts/firmware.sh TARGET [size]
 #   MODEL=DIR [TWO_JOINTS=1] scripts/firmware.sh TARGET     the arm that armrs export-c wrote to DIR instead of the closed loop
-# Variables: OPT_LEVEL of the library (2 when absent, or s), CARGO_TARGET_DIR as of cargo.
+# Variables: CARGO_TARGET_DIR as of cargo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 top=$PWD target=$1
 work=$(realpath -m "${CARGO_TARGET_DIR:-target}")/crosscheck
 unset CARGO_TARGET_DIR
 mkdir -p "$work"
-level=${OPT_LEVEL:-2}
-name=$target${TWO_JOINTS:+-two}$([ "$level" = 2 ] || echo "-$level")
+name=$target${TWO_JOINTS:+-two}
 
 need() { command -v "$1" >/dev/null || { echo "firmware: skipped, $1 is missing (Debian: $2)" >&2; exit 77; }; }
 library() { # features, then cargo arguments
   local features=$1${TWO_JOINTS:+,two-joints}
   shift
-  CARGO_PROFILE_FIRMWARE_OPT_LEVEL=$level \
-    cargo rustc --quiet --profile firmware -p arm-capi --features "$features" --target-dir "$work/$name" --crate-type staticlib "$@"
+  cargo rustc --quiet --profile firmware -p arm-capi --features "$features" --target-dir "$work/$name" --crate-type staticlib "$@"
 }
 
 [ -n "${MODEL:-}" ] || { [ -f "$work/stream.bin" ] && [ -z "$(find crates/arm-core/src crates/arm-sim -newer "$work/stream.bin" -name '*.rs' -print -quit)" ]; } ||

@@ -146,6 +146,15 @@ def test_every_kind_reaches_the_device_or_is_refused_by_name(kind: str) -> None:
         assert with_effect.source != without.source or with_effect.header != without.header
 
 
+def test_a_law_of_ones_own_is_refused_by_name() -> None:
+    """What Python computes no device can: neither the export nor what stands for the device here takes it."""
+    armrs.own_effect("thick_oil", lambda q, qd, viscosity: viscosity * qd, [armrs.Parameter("viscosity", "N m s", 0.0, 5.0, 0.0)])
+    model = true_model().replace(effects=(Effect("thick_oil", 1, parameters={"viscosity": 0.3}),))
+    for use in (export_c, online.Compensation, lambda m: online.default_settings(m, 0.001)):
+        with pytest.raises(BadInput, match="thick_oil"):
+            use(model)
+
+
 def _value(parameter: armrs.catalogue.Parameter) -> float:  # type: ignore[name-defined]
     small = parameter.default if parameter.default else min(0.05, parameter.max)
     return float(np.clip(small, parameter.min, parameter.max))

@@ -185,7 +185,7 @@ def test_the_files_are_what_the_force_was_made_of(experiment: Path, tmp_path: Pa
 def test_an_exact_sensor_reads_the_contact_force(experiment: Path) -> None:
     """But for what differences of the robot's angles at 100 Hz miss of the acceleration of 0.5 kg; other devices read the same bits."""
     trial = measured(experiment, NO_NOISE).dataset.trials[0]
-    plain = EXPERIMENT.partition("[sensors.six_axis]")[0] + "force_noise_N = 0.0\nforce_bits = 32\n\n"
+    plain = EXPERIMENT.partition("[sensors.six_axis]")[0] + "force_noise_N = 0.0\nforce_bits = 52\n\n"
     experiment.write_text(plain + EXPERIMENT[EXPERIMENT.index("[[movement]]") :], encoding="utf-8")
     contact = measure(load_experiment(experiment))
     other = contact.dataset.trials[0]

@@ -337,6 +337,7 @@ def four_segments() -> armrs.Model:
         (lambda: armrs.Movement([[0.0, 1.0], [0.0]]), "waypoints: found rows of 2 and of 1 values, allowed rows of one length"),
         (lambda: armrs.Movement([[0.0], [np.nan]]), "waypoints: found a value that is not finite"),
         (lambda: armrs.Channel("much"), "deviation: found 'much'"),
+        (lambda: armrs.Channel(range=1.0, bits=53), "bits: found 53, allowed a whole number 1 to 52"),
         (lambda: armrs.identify(3), "dataset: found 3, allowed a Dataset or a path"),
         (lambda: armrs.simulate(true_model()), "duration: found none"),
         (

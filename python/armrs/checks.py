@@ -101,6 +101,11 @@ def whole(place: str, value: object, *, least: int, most: int | None = None) -> 
     return result
 
 
+def bits(place: str, value: object) -> int:
+    """Return the bits of a converter over its whole range: no more than a number of the core tells apart."""
+    return whole(place, value, least=1, most=52)
+
+
 def numbers(place: str, value: object, unit: str = "", *, shape: Sequence[int | None] | None = None) -> np.ndarray:
     """Return an array of finite numbers, its own copy; `shape` as for `samples`."""
     result = samples(place, value, unit, shape=shape, what="finite numbers").copy()

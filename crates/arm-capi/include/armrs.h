@@ -21,6 +21,9 @@
 #define ARMRS_MUST_USE
 #endif
 
+// Length of `armrs_problem.what`, its final zero included.
+#define ARMRS_WHAT 56
+
 #if !defined(ARMRS_TWO_JOINTS)
 // Number of joints of an arm.
 #define ARMRS_JOINTS 3
@@ -88,9 +91,6 @@
 
 // Size of an `armrs_robot`.
 #define ARMRS_ROBOT_WORDS 5
-
-// Length of `armrs_problem.what`, its final zero included.
-#define ARMRS_WHAT 56
 
 // What a call came to.
 enum armrs_status
@@ -296,28 +296,6 @@ typedef struct armrs_problem {
   armrs_real max;
 } armrs_problem;
 
-// Motion of the joints at one instant.
-typedef struct armrs_motion {
-  // Time since the start [s].
-  armrs_real time;
-  // Angles [rad].
-  armrs_real q[ARMRS_JOINTS];
-  // Speeds [rad/s].
-  armrs_real qd[ARMRS_JOINTS];
-  // Accelerations [rad/s^2].
-  armrs_real qdd[ARMRS_JOINTS];
-} armrs_motion;
-
-// What acts on an arm.
-typedef struct armrs_load {
-  // Torques of motors or muscles in the joints [N m].
-  armrs_real torque[ARMRS_JOINTS];
-  // Force on the arm at its tip, y and z [N].
-  armrs_real force_on_arm[2];
-  // Moment on the arm at its tip [N m].
-  armrs_real moment_on_arm;
-} armrs_load;
-
 // An identified arm and the covariance of its unknowns.
 typedef struct armrs_compensation {
   uint64_t tag;
@@ -363,6 +341,70 @@ typedef struct armrs_estimator {
   uint64_t words[ARMRS_ESTIMATOR_WORDS];
 } armrs_estimator;
 
+// A monitor and its stop.
+typedef struct armrs_monitor {
+  uint64_t tag;
+  uint64_t words[ARMRS_MONITOR_WORDS];
+} armrs_monitor;
+
+// What one channel must not do.
+typedef struct armrs_channel {
+  // What it measures, an `armrs_quantity`.
+  uint32_t quantity;
+  // Smallest value allowed; may be infinite.
+  armrs_real min;
+  // Largest value allowed; may be infinite.
+  armrs_real max;
+  // Fastest change from one sample to the next [unit/s]; 0 for any.
+  armrs_real fastest;
+  // Farthest jump from one sample to the next, however long that took; 0 for any.
+  armrs_real farthest;
+  // How long the value may stay the same to the last bit while motion is commanded [us]; 0 for ever.
+  uint64_t frozen_after;
+} armrs_channel;
+
+// Joints led together on straight lines through waypoints, at rest in each.
+typedef struct armrs_path {
+  uint64_t tag;
+  uint64_t words[ARMRS_PATH_WORDS];
+} armrs_path;
+
+// What a movement must not exceed.
+typedef struct armrs_limits {
+  // Speed [rad/s].
+  armrs_real speed;
+  // Acceleration [rad/s^2].
+  armrs_real acceleration;
+} armrs_limits;
+
+// A robot of two links.
+typedef struct armrs_robot {
+  uint64_t tag;
+  uint64_t words[ARMRS_ROBOT_WORDS];
+} armrs_robot;
+
+// Motion of the joints at one instant.
+typedef struct armrs_motion {
+  // Time since the start [s].
+  armrs_real time;
+  // Angles [rad].
+  armrs_real q[ARMRS_JOINTS];
+  // Speeds [rad/s].
+  armrs_real qd[ARMRS_JOINTS];
+  // Accelerations [rad/s^2].
+  armrs_real qdd[ARMRS_JOINTS];
+} armrs_motion;
+
+// What acts on an arm.
+typedef struct armrs_load {
+  // Torques of motors or muscles in the joints [N m].
+  armrs_real torque[ARMRS_JOINTS];
+  // Force on the arm at its tip, y and z [N].
+  armrs_real force_on_arm[2];
+  // Moment on the arm at its tip [N m].
+  armrs_real moment_on_arm;
+} armrs_load;
+
 // The measurements of one control period.
 typedef struct armrs_sample {
   // Joint angles [rad].
@@ -400,28 +442,6 @@ typedef struct armrs_health {
   armrs_real age;
 } armrs_health;
 
-// A monitor and its stop.
-typedef struct armrs_monitor {
-  uint64_t tag;
-  uint64_t words[ARMRS_MONITOR_WORDS];
-} armrs_monitor;
-
-// What one channel must not do.
-typedef struct armrs_channel {
-  // What it measures, an `armrs_quantity`.
-  uint32_t quantity;
-  // Smallest value allowed; may be infinite.
-  armrs_real min;
-  // Largest value allowed; may be infinite.
-  armrs_real max;
-  // Fastest change from one sample to the next [unit/s]; 0 for any.
-  armrs_real fastest;
-  // Farthest jump from one sample to the next, however long that took; 0 for any.
-  armrs_real farthest;
-  // How long the value may stay the same to the last bit while motion is commanded [us]; 0 for ever.
-  uint64_t frozen_after;
-} armrs_channel;
-
 // What a monitor sees of one control period.
 typedef struct armrs_observation {
   // The controller's clock [us].
@@ -447,26 +467,6 @@ typedef struct armrs_stop {
   // The controller's clock [us].
   uint64_t at;
 } armrs_stop;
-
-// Joints led together on straight lines through waypoints, at rest in each.
-typedef struct armrs_path {
-  uint64_t tag;
-  uint64_t words[ARMRS_PATH_WORDS];
-} armrs_path;
-
-// What a movement must not exceed.
-typedef struct armrs_limits {
-  // Speed [rad/s].
-  armrs_real speed;
-  // Acceleration [rad/s^2].
-  armrs_real acceleration;
-} armrs_limits;
-
-// A robot of two links.
-typedef struct armrs_robot {
-  uint64_t tag;
-  uint64_t words[ARMRS_ROBOT_WORDS];
-} armrs_robot;
 
 #ifdef __cplusplus
 extern "C" {
@@ -509,6 +509,104 @@ armrs_status armrs_arm_init(struct armrs_arm *arm,
                             const struct armrs_effect *effects,
                             size_t count,
                             struct armrs_problem *problem);
+
+// Makes it from the values of the unknowns of an arm and their covariance, row by row, of which the lower triangle is read. What is known
+// exactly, and unknowns that are not used, have zeros there. `problem`, if not null, says what was refused.
+//
+// # Safety
+// The pointers are null or point to what is said.
+ARMRS_MUST_USE
+armrs_status armrs_compensation_init(struct armrs_compensation *compensation,
+                                     const struct armrs_arm *arm,
+                                     const armrs_real values[ARMRS_UNKNOWNS],
+                                     const armrs_real covariance[ARMRS_UNKNOWNS * ARMRS_UNKNOWNS],
+                                     struct armrs_problem *problem);
+
+// Fills settings for an arm and a control period [s]: movements to 3 Hz, joints within half a turn and below 20 rad/s, loads
+// below ten times the arm's weight, sensors not frozen for half a second, a support within half of each joint's largest
+// weight torque of the expected one.
+//
+// # Safety
+// The pointers are null or point to what is said.
+ARMRS_MUST_USE
+armrs_status armrs_estimator_settings(struct armrs_settings *settings,
+                                      const struct armrs_arm *arm,
+                                      armrs_real period);
+
+// Makes an estimator that starts from an arm: base parameters as of the arm, uncertain by `uncertainty` of masses, centres of
+// mass and inertias; effects as given, their linear parameters otherwise open. `problem`, if not null, says what was refused.
+//
+// # Safety
+// The pointers are null or point to what is said.
+ARMRS_MUST_USE
+armrs_status armrs_estimator_init(struct armrs_estimator *estimator,
+                                  const struct armrs_arm *arm,
+                                  armrs_real uncertainty,
+                                  const struct armrs_settings *settings,
+                                  struct armrs_problem *problem);
+
+// Makes a monitor of `count` channels, 1 to ARMRS_CHANNELS; of the others no value is read.
+// `oldest`: greatest age of the data that is allowed [us]. `period`: longest time from one check to the next [us], usually two
+// control periods. `problem`, if not null, says what was refused.
+//
+// # Safety
+// The pointers are null or point to what is said.
+ARMRS_MUST_USE
+armrs_status armrs_monitor_init(struct armrs_monitor *monitor,
+                                const struct armrs_channel *channels,
+                                size_t count,
+                                uint64_t oldest,
+                                uint64_t period,
+                                struct armrs_problem *problem);
+
+// Makes a path.
+//
+// `waypoints`: `count` times ARMRS_JOINTS angles [rad], waypoint by waypoint, 1 to ARMRS_WAYPOINTS of them. `limits`: one for each joint.
+// `pause`: time at rest in each waypoint between [s]. `smooth`: 0 for trapezoidal speed, else continuous acceleration.
+// Angles lie within 628 rad. `problem`, if not null, says what was refused.
+//
+// # Safety
+// The pointers are null or point to what is said.
+ARMRS_MUST_USE
+armrs_status armrs_path_init(struct armrs_path *path,
+                             const armrs_real *waypoints,
+                             size_t count,
+                             const struct armrs_limits limits[ARMRS_JOINTS],
+                             armrs_real pause,
+                             uint32_t smooth,
+                             struct armrs_problem *problem);
+
+// Makes a robot from two lengths and the position of its first joint [m]; `elbow_up`: on which side the elbow is, seen on
+// the line from base to handle.
+//
+// # Safety
+// The pointers are null or point to what is said.
+ARMRS_MUST_USE
+armrs_status armrs_robot_init(struct armrs_robot *robot,
+                              const armrs_real lengths[2],
+                              const armrs_real base[2],
+                              uint32_t elbow_up,
+                              struct armrs_problem *problem);
+
+// Seals memory with its CRC-32 (IEEE 802.3): an arm or a compensation once it is made, an estimator before it is saved. Five
+// instructions for each bit of it, about 40 for each byte: not for every period.
+//
+// # Safety
+// `memory` is null or points to `size` bytes; `seal` is null or points to a number.
+ARMRS_MUST_USE
+armrs_status armrs_seal(const void *memory,
+                        size_t size,
+                        uint32_t *seal);
+
+// ARMRS_OK where memory has the seal that it was given, else ARMRS_CORRUPT: bits have flipped, or what was saved and read back
+// is something else.
+//
+// # Safety
+// `memory` is null or points to `size` bytes.
+ARMRS_MUST_USE
+armrs_status armrs_verify(const void *memory,
+                          size_t size,
+                          uint32_t seal);
 
 // Carries the states of effects (relaxation, thixotropy, a late stretch_reflex) over a period [s]; nothing for arms without
 // any. A motion that is not finite leaves them as they were.
@@ -572,18 +670,6 @@ armrs_status armrs_forward_dynamics(const struct armrs_arm *arm,
                                     const struct armrs_load *load,
                                     armrs_real acceleration[ARMRS_JOINTS]);
 
-// Makes it from the values of the unknowns of an arm and their covariance, row by row, of which the lower triangle is read. What is known
-// exactly, and unknowns that are not used, have zeros there. `problem`, if not null, says what was refused.
-//
-// # Safety
-// The pointers are null or point to what is said.
-ARMRS_MUST_USE
-armrs_status armrs_compensation_init(struct armrs_compensation *compensation,
-                                     const struct armrs_arm *arm,
-                                     const armrs_real values[ARMRS_UNKNOWNS],
-                                     const armrs_real covariance[ARMRS_UNKNOWNS * ARMRS_UNKNOWNS],
-                                     struct armrs_problem *problem);
-
 // Torques that carry the arm: its weight, and what its effects resist with at the speeds of `motion`; accelerations are not
 // read, and effects with a state are taken at rest. `sd`, if not null: their standard deviations [N m].
 //
@@ -594,29 +680,6 @@ armrs_status armrs_compensation_carry(const struct armrs_compensation *compensat
                                       const struct armrs_motion *motion,
                                       armrs_real torque[ARMRS_JOINTS],
                                       armrs_real sd[ARMRS_JOINTS]);
-
-// Fills settings for an arm and a control period [s]: movements to 3 Hz, joints within half a turn and below 20 rad/s, loads
-// below ten times the arm's weight, sensors not frozen for half a second, a support within half of each joint's largest
-// weight torque of the expected one.
-//
-// # Safety
-// The pointers are null or point to what is said.
-ARMRS_MUST_USE
-armrs_status armrs_estimator_settings(struct armrs_settings *settings,
-                                      const struct armrs_arm *arm,
-                                      armrs_real period);
-
-// Makes an estimator that starts from an arm: base parameters as of the arm, uncertain by `uncertainty` of masses, centres of
-// mass and inertias; effects as given, their linear parameters otherwise open. `problem`, if not null, says what was refused.
-//
-// # Safety
-// The pointers are null or point to what is said.
-ARMRS_MUST_USE
-armrs_status armrs_estimator_init(struct armrs_estimator *estimator,
-                                  const struct armrs_arm *arm,
-                                  armrs_real uncertainty,
-                                  const struct armrs_settings *settings,
-                                  struct armrs_problem *problem);
 
 // One control period; `sample` is null where one is missing. `heed`, if not null, says what became of it.
 //
@@ -655,20 +718,6 @@ ARMRS_MUST_USE
 armrs_status armrs_estimator_health(const struct armrs_estimator *estimator,
                                     struct armrs_health *health);
 
-// Makes a monitor of `count` channels, 1 to ARMRS_CHANNELS; of the others no value is read.
-// `oldest`: greatest age of the data that is allowed [us]. `period`: longest time from one check to the next [us], usually two
-// control periods. `problem`, if not null, says what was refused.
-//
-// # Safety
-// The pointers are null or point to what is said.
-ARMRS_MUST_USE
-armrs_status armrs_monitor_init(struct armrs_monitor *monitor,
-                                const struct armrs_channel *channels,
-                                size_t count,
-                                uint64_t oldest,
-                                uint64_t period,
-                                struct armrs_problem *problem);
-
 // Looks at one control period. ARMRS_STOPPED from the first fault on until `armrs_monitor_reset`; `stop`, if not null, then
 // says what it was.
 //
@@ -685,23 +734,6 @@ armrs_status armrs_monitor_check(struct armrs_monitor *monitor,
 // The pointers are null or point to what is said.
 ARMRS_MUST_USE armrs_status armrs_monitor_reset(struct armrs_monitor *monitor);
 
-// Makes a path.
-//
-// `waypoints`: `count` times ARMRS_JOINTS angles [rad], waypoint by waypoint, 1 to ARMRS_WAYPOINTS of them. `limits`: one for each joint.
-// `pause`: time at rest in each waypoint between [s]. `smooth`: 0 for trapezoidal speed, else continuous acceleration.
-// Angles lie within 628 rad. `problem`, if not null, says what was refused.
-//
-// # Safety
-// The pointers are null or point to what is said.
-ARMRS_MUST_USE
-armrs_status armrs_path_init(struct armrs_path *path,
-                             const armrs_real *waypoints,
-                             size_t count,
-                             const struct armrs_limits limits[ARMRS_JOINTS],
-                             armrs_real pause,
-                             uint32_t smooth,
-                             struct armrs_problem *problem);
-
 // Time from the first to the last waypoint [s].
 //
 // # Safety
@@ -713,18 +745,6 @@ ARMRS_MUST_USE armrs_status armrs_path_duration(const struct armrs_path *path, a
 // # Safety
 // The pointers are null or point to what is said.
 ARMRS_MUST_USE armrs_status armrs_path_at(const struct armrs_path *path, armrs_real time, struct armrs_motion *motion);
-
-// Makes a robot from two lengths and the position of its first joint [m]; `elbow_up`: on which side the elbow is, seen on
-// the line from base to handle.
-//
-// # Safety
-// The pointers are null or point to what is said.
-ARMRS_MUST_USE
-armrs_status armrs_robot_init(struct armrs_robot *robot,
-                              const armrs_real lengths[2],
-                              const armrs_real base[2],
-                              uint32_t elbow_up,
-                              struct armrs_problem *problem);
 
 // Position of the handle at two joint angles [m].
 //
@@ -753,26 +773,6 @@ armrs_status armrs_robot_speeds(const struct armrs_robot *robot,
                                 const armrs_real q[2],
                                 const armrs_real velocity[2],
                                 armrs_real speeds[2]);
-
-// Seals memory with its CRC-32 (IEEE 802.3): an arm or a compensation once it is made, an estimator before it is saved. Five
-// instructions for each bit of it, about 40 for each byte: not for every period.
-//
-// # Safety
-// `memory` is null or points to `size` bytes; `seal` is null or points to a number.
-ARMRS_MUST_USE
-armrs_status armrs_seal(const void *memory,
-                        size_t size,
-                        uint32_t *seal);
-
-// ARMRS_OK where memory has the seal that it was given, else ARMRS_CORRUPT: bits have flipped, or what was saved and read back
-// is something else.
-//
-// # Safety
-// `memory` is null or points to `size` bytes.
-ARMRS_MUST_USE
-armrs_status armrs_verify(const void *memory,
-                          size_t size,
-                          uint32_t seal);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -14,6 +14,8 @@ pub(crate) fn finite<T: Scalar>(name: &'static str, index: usize, value: T) -> R
 /// Smallest number that counts as positive: the smallest normal one of single precision.
 pub(crate) const SMALLEST: f64 = f32::MIN_POSITIVE as f64;
 
+// Once in the code: a device makes many checks of one set-up.
+#[inline(never)]
 fn at_least<T: Scalar>(
     name: &'static str,
     index: usize,

@@ -8,33 +8,18 @@ use crate::scalar::Real;
 const BLOCK: usize = 6;
 
 /// Copies a triangular matrix.
-// Not by rows: the copying of memory in general takes longer.
+// Down the blocks of each row, for what lies together would be copied by the function for memory in general, which takes longer.
 #[inline(never)]
 pub(crate) fn copy_triangle<T: Copy, const P: usize>(to: &mut [[T; P]; P], from: &[[T; P]; P]) {
-    for (i, (to, from)) in to.iter_mut().zip(from).enumerate() {
-        for_blocks(to, from, i, |place, value| *place = value);
-    }
-}
-
-/// Goes through two rows of triangular matrices from a place on, or a little before it, where there are zeros.
-#[inline(always)]
-fn for_blocks<A, T: Copy, const P: usize>(
-    places: &mut [A; P],
-    values: &[T; P],
-    from: usize,
-    act: impl Fn(&mut A, T),
-) {
-    let (blocks, last) = places.as_chunks_mut::<BLOCK>();
-    let (others, rest) = values.as_chunks::<BLOCK>();
-    let blocks = blocks.get_mut(from / BLOCK..).unwrap_or_default();
-    let others = others.get(from / BLOCK..).unwrap_or_default();
-    for (block, other) in blocks.iter_mut().zip(others) {
-        for (place, &value) in block.iter_mut().zip(other) {
-            act(place, value);
+    for first in (0..P).step_by(BLOCK) {
+        for (to, from) in to.iter_mut().zip(from).take(first + BLOCK) {
+            let (to, from) = (to.get_mut(first..), from.get(first..));
+            let (to, from) = (to.unwrap_or_default(), from.unwrap_or_default());
+            match (to.first_chunk_mut::<BLOCK>(), from.first_chunk()) {
+                (Some(to), Some(from)) => *to = *from,
+                _ => to.iter_mut().zip(from).for_each(|(to, from)| *to = *from),
+            }
         }
-    }
-    for (place, &value) in last.iter_mut().zip(rest) {
-        act(place, value);
     }
 }
 
@@ -50,11 +35,19 @@ pub(crate) struct Covariance<T, const P: usize> {
 impl<T: Real, const P: usize> Covariance<T, P> {
     /// That of independent unknowns, from their standard deviations.
     pub fn independent(sd: [T; P]) -> Self {
-        let mut root = [[T::ZERO; P]; P];
-        for (k, row) in root.iter_mut().enumerate() {
-            row[k] = sd[k];
+        let mut new = Self {
+            root: [[T::ZERO; P]; P],
+        };
+        new.restart(sd.into_iter());
+        new
+    }
+
+    /// The same, in place.
+    pub fn restart(&mut self, sd: impl Iterator<Item = T>) {
+        self.root.as_flattened_mut().fill(T::ZERO);
+        for (k, (row, sd)) in self.root.iter_mut().zip(sd).enumerate() {
+            row[k] = sd;
         }
-        Self { root }
     }
 
     /// Sums of the leading unknowns with weights, each from one of them on, given in the independent quantities.
@@ -82,9 +75,19 @@ impl<T: Real, const N: usize, const P: usize> Sums<T, N, P> {
         let Some(row) = covariance.root.get(unknown).filter(|_| number < N) else {
             return;
         };
-        for_blocks(&mut self.0, row, unknown, |places, value| {
-            places[number] += weight * value
-        });
+        // From the block of the unknown on: before it there are zeros.
+        let (blocks, last) = self.0.as_chunks_mut::<BLOCK>();
+        let (others, rest) = row.as_chunks::<BLOCK>();
+        let blocks = blocks.get_mut(unknown / BLOCK..).unwrap_or_default();
+        let others = others.get(unknown / BLOCK..).unwrap_or_default();
+        for (block, other) in blocks.iter_mut().zip(others) {
+            for (places, &value) in block.iter_mut().zip(other) {
+                places[number] += weight * value;
+            }
+        }
+        for (places, &value) in last.iter_mut().zip(rest) {
+            places[number] += weight * value;
+        }
     }
 
     /// Their standard deviations.

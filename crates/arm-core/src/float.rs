@@ -33,8 +33,8 @@ impl Real for f64 {
         self
     }
     #[inline]
-    fn of_count(count: u64) -> Self {
-        count as f64
+    fn of_count(count: u32) -> Self {
+        f64::from(count)
     }
     #[inline]
     fn whole(self) -> u32 {
@@ -52,7 +52,7 @@ impl Real for f32 {
         u64::from(self.to_bits())
     }
     #[inline]
-    fn of_count(count: u64) -> Self {
+    fn of_count(count: u32) -> Self {
         count as f32
     }
     #[inline]

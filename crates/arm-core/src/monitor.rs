@@ -281,7 +281,10 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         moving: impl Fn(usize) -> bool,
     ) -> Result<(), Stop<T>> {
         if self.stop.is_none() {
-            self.stop = self.fault(times, values, moving);
+            let Some(found) = self.fault(times, values, moving) else {
+                return Ok(());
+            };
+            self.stop = Some(found);
         }
         self.stop.map_or(Ok(()), Err)
     }
@@ -337,31 +340,28 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     }
 
     fn clock_fault(&self, [now, stamp]: [u64; 2]) -> Option<Stop<T>> {
-        let stop = |reason, age: T| Stop {
+        let Times { oldest, period } = self.times;
+        let last = self.last.as_ref().map_or([0; 2], |l| [l.now, l.stamp]);
+        let first = self.last.is_none();
+        let (reason, time, limit) = if stamp > now {
+            (Reason::Clock, stamp - now, oldest)
+        } else if now < last[0] || stamp < last[1] {
+            (Reason::Clock, now - stamp, oldest)
+        } else if !first && now - last[0] > period {
+            (Reason::Stalled, now - last[0], period)
+        } else if now - stamp > oldest {
+            (Reason::Late, now - stamp, oldest)
+        } else {
+            return None;
+        };
+        let time = seconds::<T>(time);
+        Some(Stop {
             reason,
             channel: None,
-            value: age,
-            limit: seconds(self.times.oldest),
+            value: if stamp > now { -time } else { time },
+            limit: seconds(limit),
             at: now,
-        };
-        if stamp > now {
-            return Some(stop(Reason::Clock, -seconds::<T>(stamp - now)));
-        }
-        let age = now - stamp;
-        if let Some(last) = &self.last
-            && (now < last.now || stamp < last.stamp)
-        {
-            return Some(stop(Reason::Clock, seconds(age)));
-        }
-        if let Some(last) = &self.last
-            && now - last.now > self.times.period
-        {
-            return Some(Stop {
-                limit: seconds(self.times.period),
-                ..stop(Reason::Stalled, seconds(now - last.now))
-            });
-        }
-        (age > self.times.oldest).then(|| stop(Reason::Late, seconds(age)))
+        })
     }
 
     /// Remembers the observation and finds the first channel that is not as allowed. Repeats of one sample count as one.
@@ -479,6 +479,8 @@ fn at_least_one(name: &'static str, found: u64) -> Result<(), Invalid> {
     })
 }
 
+#[inline(never)]
 fn seconds<T: Real>(microseconds: u64) -> T {
-    T::of_count(microseconds) * T::of(1e-6)
+    let [low, high] = [microseconds as u32, (microseconds >> 32) as u32].map(T::of_count);
+    (high * T::of(4_294_967_296.0) + low) * T::of(1e-6)
 }

@@ -72,7 +72,7 @@ pub fn regressor<T: Scalar, const N: usize>(
 }
 
 /// The columns to the moments of link `k`: `X_k`, `H_k`, `J_k`; speeds and accelerations are those of the links.
-#[inline]
+#[inline(always)]
 pub(crate) fn link_columns<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,

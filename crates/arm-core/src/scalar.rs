@@ -104,7 +104,7 @@ pub trait Real: Scalar + PartialOrd {
     /// Its bits.
     fn bits(self) -> u64;
     /// The nearest number to a count.
-    fn of_count(count: u64) -> Self;
+    fn of_count(count: u32) -> Self;
     /// Its whole part; zero for what is negative or no number, the largest count for what is larger.
     fn whole(self) -> u32;
 }

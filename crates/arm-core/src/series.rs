@@ -135,7 +135,10 @@ pub(crate) fn far_reduced_sin_cos(x: f64) -> Reduced<f64> {
     let nearest = quarters.wrapping_add(1 << 125) >> 126;
     // The rest times 2⁶⁴, to radians.
     let rest = (quarters.wrapping_sub(nearest << 126) as i128 >> 62) as i64;
-    let r = rest as f64 * (core::f64::consts::FRAC_PI_2 / 18_446_744_073_709_551_616.0);
+    // By halves, which processors convert themselves; their sum is rounded once.
+    let [high, low] = [f64::from((rest >> 32) as i32), f64::from(rest as u32)];
+    let rest = high * 4_294_967_296.0 + low;
+    let r = rest * (core::f64::consts::FRAC_PI_2 / 18_446_744_073_709_551_616.0);
     let sign = 1.0_f64.copysign(x);
     polynomials(ROUND + sign * nearest as u32 as f64, sign * r, &DOUBLE)
 }

@@ -461,7 +461,7 @@ def _devices(value: object, truth: Model) -> Devices:
                 raise BadInput("[sensors.six_axis]", Text(f"the effect {effect.kind}"), "none of the frame: the tool's weight is along −z")
         table["six_axis"] = _part_of(SixAxis, "[sensors.six_axis]", table["six_axis"])
     made: Devices = _part_of(Devices, place, table)
-    checks.whole(f"{place}, force_bits", made.force_bits, least=1, most=52)
+    checks.bits(f"{place}, force_bits", made.force_bits)
     checks.flag(f"{place}, emg", made.emg)
     checks.number(f"{place}, rate_Hz", made.rate_Hz, least=10.0, most=1000.0, unit="Hz")
     checks.number(f"{place}, force_range_N", made.force_range_N, above=0.0, most=1e5, unit="N")

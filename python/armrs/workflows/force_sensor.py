@@ -110,7 +110,7 @@ class SixAxis:
         checks.number("tool_inertia_kg_m2", self.tool_inertia_kg_m2, least=0.0, most=1.0, unit="kg m²")
         for name, (unit, least, most) in _BOUNDS.items():
             object.__setattr__(self, name, _three(name, getattr(self, name), unit=unit, least=least, most=most))
-        checks.whole("bits", self.bits, least=1, most=52)
+        checks.bits("bits", self.bits)
         object.__setattr__(self, "crosstalk", _matrix(self.crosstalk))
 
     def read(self, rig: tuple[Robot, float], motion: RobotMotion, force_on_robot: np.ndarray, noise: np.random.Generator) -> np.ndarray:

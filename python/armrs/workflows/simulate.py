@@ -68,7 +68,7 @@ class Channel:
         checks.number("correlation_time", self.correlation_time, least=0.0, unit="s")
         checks.extent("range", self.range, above=0.0)
         if self.bits is not None:
-            checks.whole("bits", self.bits, least=1, most=32)
+            checks.bits("bits", self.bits)
 
 
 @dataclass(frozen=True)

@@ -156,14 +156,16 @@ macro_rules! catalogue {
                 match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters),)* Kind::Own(_) => T::ZERO }
             }
             /// Whether what it does depends on states of its own.
+            #[cfg_attr(target_os = "none", inline(never))]
             pub fn remembers(&self) -> bool {
-                self.kind.info().states > 0 && match self.kind {
-                    $(Kind::$law => !$module::$law::forgets(&self.parameters),)*
-                    Kind::Own(_) => true,
+                match self.kind {
+                    $(Kind::$law => <$module::$law as Law>::INFO.states > 0 && !$module::$law::forgets(&self.parameters),)*
+                    Kind::Own(own) => own.info().states > 0,
                 }
             }
             /// Time derivatives of the effect's own states.
-            #[inline]
+            #[cfg_attr(target_os = "none", inline(never))]
+            #[cfg_attr(not(target_os = "none"), inline)]
             pub fn memory_rate(&self, at: &Local<T>) -> States<T> {
                 if !self.on { return [T::ZERO; MAX_STATES]; }
                 match self.kind {

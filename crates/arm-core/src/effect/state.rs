@@ -40,13 +40,16 @@ impl<T: Scalar> Effect<T> {
             let there = rate(moved);
             from_fn(|i| (there[i] - now[i]) / change)
         };
-        if self.kind.info().states == 1 {
-            let [rate, slope] = [now[0], slope(0)[0]];
+        let count = self.kind.info().states;
+        let mut columns = [[T::ZERO; MAX_STATES]; MAX_STATES];
+        for (k, column) in columns.iter_mut().enumerate().take(count) {
+            *column = slope(k);
+        }
+        if count == 1 {
             let mut next = states;
-            next[0] += interval * growth(slope * interval) * rate;
+            next[0] += interval * growth(columns[0][0] * interval) * now[0];
             return next;
         }
-        let columns: [States<T>; MAX_STATES] = from_fn(slope);
         let step = growth_of_several(&columns, interval, &now.map(|v| v * interval));
         from_fn(|i| states[i] + step[i])
     }
@@ -54,32 +57,48 @@ impl<T: Scalar> Effect<T> {
 
 /// `φ(hΛ) v` with `φ(z) = (1 − z/10 + z²/60) / (1 − 3z/5 + 3z²/20 − z³/60)`, for slopes `Λ` in columns.
 fn growth_of_several<T: Scalar>(columns: &[States<T>; 3], h: T, v: &States<T>) -> States<T> {
-    let times = |w: &States<T>| -> States<T> {
-        from_fn(|i| h * (columns[0][i] * w[0] + columns[1][i] * w[1] + columns[2][i] * w[2]))
-    };
-    let sum = |w: &States<T>, factors: [f64; 4]| -> States<T> {
-        let once = times(w);
-        let twice = times(&once);
-        let powers = [*w, once, twice, times(&twice)];
-        from_fn(|i| (0..4).fold(T::ZERO, |sum, k| sum + T::of(factors[k]) * powers[k][i]))
-    };
-    let right = sum(v, [1.0, -0.1, 1.0 / 60.0, 0.0]);
+    let right = polynomial(columns, h, v, &[1.0, -0.1, 1.0 / 60.0, 0.0]);
     let left: [States<T>; 3] = from_fn(|k| {
         let unit = from_fn(|i| if i == k { T::ONE } else { T::ZERO });
-        sum(&unit, [1.0, -0.6, 0.15, -1.0 / 60.0])
+        polynomial(columns, h, &unit, &[1.0, -0.6, 0.15, -1.0 / 60.0])
     });
     // By Cramer's rule: of states that settle, no eigenvalue of the left side is below one.
-    let det = |[a, b, c]: [&States<T>; 3]| {
-        let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
-        a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)
-    };
     let [x, y, z] = &left;
-    let whole = det([x, y, z]);
+    let whole = determinant([x, y, z]);
     [
-        det([&right, y, z]) / whole,
-        det([x, &right, z]) / whole,
-        det([x, y, &right]) / whole,
+        determinant([&right, y, z]) / whole,
+        determinant([x, &right, z]) / whole,
+        determinant([x, y, &right]) / whole,
     ]
+}
+
+/// `(f₀ + f₁hΛ + f₂(hΛ)² + f₃(hΛ)³) w`.
+#[cfg_attr(target_os = "none", inline(never))]
+fn polynomial<T: Scalar>(
+    columns: &[States<T>; 3],
+    h: T,
+    w: &States<T>,
+    factors: &[f64; 4],
+) -> States<T> {
+    let (mut power, mut sum) = (*w, [T::ZERO; 3]);
+    for (k, &factor) in factors.iter().enumerate() {
+        if k > 0 {
+            let w = power;
+            power = from_fn(|i| {
+                h * (columns[0][i] * w[0] + columns[1][i] * w[1] + columns[2][i] * w[2])
+            });
+        }
+        for i in 0..3 {
+            sum[i] += T::of(factor) * power[i];
+        }
+    }
+    sum
+}
+
+#[cfg_attr(target_os = "none", inline(never))]
+fn determinant<T: Scalar>([a, b, c]: [&States<T>; 3]) -> T {
+    let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+    a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)
 }
 
 /// `(eᶻ − 1)/z`; growth is limited as above.

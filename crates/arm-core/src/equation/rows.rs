@@ -3,9 +3,10 @@
 use core::array::from_fn;
 
 use super::{Equation, Measured, Needed};
-use crate::effect::{Effect, Kind, MAX_LINEAR, Motion, States, resisting_torque};
+use crate::effect::{Effect, Kind, Motion, States, UnitTorques, resisting_torque};
 use crate::kinematics::to_links;
 use crate::regressor::link_columns;
+use crate::unroll::each;
 use crate::{Joints, Pose, Scalar, joint_force, joints, static_torque};
 
 impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P, E> {
@@ -83,7 +84,8 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         for j in 0..N {
             rows.known[j] = self.chain.rotor[j] * qdd[j];
         }
-        for k in 0..N {
+        // Written out: most of what a link adds is zero.
+        each!(k in 0, N => {
             let [x, h, inertia] = link_columns(&self.chain, pose, moving, k);
             for (j, row) in rows.columns.iter_mut().enumerate() {
                 for (place, column) in [(k, &x), (N + k, &inertia)] {
@@ -93,7 +95,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
                 }
                 rows.known[j] += h[j] * self.chain.h[k];
             }
-        }
+        });
     }
 
     /// The motion with what effects feel of the forces through the joints.
@@ -115,12 +117,12 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         memory: &[States<T>; E],
         rows: &mut Needed<T, N, P>,
     ) {
-        self.each_acting(motion, memory, |effect, numbered| {
+        self.each_acting(motion, memory, |effect, first, units| {
             let mut write = |joint: usize, share: Option<T>| {
                 let Some(row) = rows.columns.get_mut(joint) else {
                     return;
                 };
-                for (i, unit) in numbered {
+                for (i, &unit) in (first..).zip(units) {
                     if let Some(place) = row.get_mut(i) {
                         *place = share.map_or(unit, |share| share * unit);
                     }
@@ -134,19 +136,18 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         self.add_own(motion, memory, &mut rows.known);
     }
 
-    /// Goes through the effects: each with what it resists with for each unit of its unknowns, and their numbers. Of one that has
-    /// fewer unknowns than others, there are zeros too, with numbers of the next.
+    /// Goes through the effects: each with the number of its first unknown, and what it resists with for each unit of that and of
+    /// those after it. Of one that has fewer unknowns than others, there are zeros too, with numbers of the next.
     #[inline(always)]
     pub(super) fn each_acting(
         &self,
         motion: &Motion<T, N>,
         memory: &[States<T>; E],
-        mut take: impl FnMut(&Effect<T>, [(usize, T); MAX_LINEAR]),
+        mut take: impl FnMut(&Effect<T>, usize, &UnitTorques<T>),
     ) {
         for ((effect, &first), states) in self.effects.iter().zip(&self.first).zip(memory) {
             if effect.on {
-                let units = effect.unit_torques(motion, states);
-                take(effect, from_fn(|k| (usize::from(first) + k, units[k])));
+                take(effect, first.into(), &effect.unit_torques(motion, states));
             }
         }
     }

@@ -43,9 +43,9 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     #[inline(never)]
     fn resisting_unloaded(&self, motion: &Motion<T, N>, memory: &[States<T>; E]) -> Joints<T, N> {
         let mut total = joints([T::ZERO; N]);
-        self.each_acting(motion, memory, |effect, numbered| {
-            let pairs = effect.parameters.iter().zip(numbered);
-            let torque = pairs.fold(T::ZERO, |sum, (&value, (_, unit))| sum + value * unit);
+        self.each_acting(motion, memory, |effect, _, units| {
+            let pairs = effect.parameters.iter().zip(units);
+            let torque = pairs.fold(T::ZERO, |sum, (&value, &unit)| sum + value * unit);
             let mut add = |joint: usize, torque: T| {
                 if let Some(place) = total.as_mut_slice().get_mut(joint) {
                     *place += torque;
@@ -83,8 +83,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Equation<T, N, P, 
                 torques[m][j] = sums[m];
             }
         }
-        self.each_acting(motion, memory, |effect, numbered| {
-            for (i, unit) in numbered {
+        self.each_acting(motion, memory, |effect, first, units| {
+            if units.iter().all(|&unit| unit == T::ZERO) {
+                return;
+            }
+            for (i, &unit) in (first..).zip(units) {
                 if unit == T::ZERO {
                     continue;
                 }

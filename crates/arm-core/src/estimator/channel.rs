@@ -1,5 +1,7 @@
 //! One sensor channel: what is wrong with its values, and low-passes that also differentiate.
 
+use core::array::from_fn;
+
 use crate::scalar::Real;
 
 /// What was wrong with a sample.
@@ -130,7 +132,8 @@ impl<T: Real> Channel<T> {
     }
 
     /// Starts anew at a value; false if it is none.
-    pub fn restart(&mut self, value: T) -> bool {
+    #[inline(never)]
+    fn restart(&mut self, value: T) -> bool {
         if !value.is_finite() {
             return false;
         }
@@ -150,12 +153,7 @@ impl<T: Real> Channel<T> {
     /// * `farthest` - that a value can move in one period; finite
     /// * `frozen_after` - periods in which the bits may stay the same; `None` while the arm rests
     #[inline]
-    pub fn fault(
-        &mut self,
-        value: Option<T>,
-        farthest: T,
-        frozen_after: Option<u32>,
-    ) -> Option<Fault> {
+    fn fault(&mut self, value: Option<T>, farthest: T, frozen_after: Option<u32>) -> Option<Fault> {
         let Some(value) = value else {
             return Some(Fault::Missing);
         };
@@ -182,13 +180,13 @@ impl<T: Real> Channel<T> {
         if near {
             return None;
         }
-        let periods = T::of_count(u64::from(self.bridged) + 1);
+        let periods = T::of_count(self.bridged.saturating_add(1));
         (moved > farthest * periods).then_some(Fault::Spike)
     }
 
     /// Takes a good value, or bridges the lack of one by going on as before; what the first low-pass lets through.
     #[inline]
-    pub fn step(&mut self, value: Option<T>, cutoff: &Cutoff<T>) -> Smooth<T> {
+    fn step(&mut self, value: Option<T>, cutoff: &Cutoff<T>) -> Smooth<T> {
         match value {
             Some(value) => {
                 self.last = value;
@@ -212,7 +210,7 @@ impl<T: Real> Channel<T> {
 
     /// The value behind the second low-pass.
     #[inline]
-    pub fn value(&mut self, first: &Smooth<T>, cutoff: &Cutoff<T>) -> T {
+    fn value(&mut self, first: &Smooth<T>, cutoff: &Cutoff<T>) -> T {
         if !self.alive {
             return first.value;
         }
@@ -228,8 +226,69 @@ impl<T: Real> Channel<T> {
         let smooth = self.of_rate.step(first.rate, cutoff);
         [smooth.value, smooth.rate]
     }
+}
 
-    pub fn bridged(&self) -> u32 {
-        self.bridged
+/// Starts channels anew at values; false if one is none.
+// Once in the code for all kinds of channels, as what follows.
+#[inline(never)]
+pub(super) fn restart<T: Real, const K: usize>(
+    channels: &mut [Channel<T>; K],
+    values: &[T; K],
+) -> bool {
+    let pairs = channels.iter_mut().zip(values);
+    pairs.fold(true, |good, (channel, &value)| {
+        good & channel.restart(value)
+    })
+}
+
+/// The values of channels behind the second low-pass.
+#[inline(never)]
+pub(super) fn values<T: Real, const K: usize>(
+    channels: &mut [Channel<T>; K],
+    first: &[Smooth<T>; K],
+    cutoff: &Cutoff<T>,
+) -> [T; K] {
+    from_fn(|i| channels[i].value(&first[i], cutoff))
+}
+
+/// What is wrong with the values of one period.
+pub(super) struct Checks {
+    /// See [`Channel::fault`].
+    pub frozen_after: Option<u32>,
+    /// The first fault.
+    pub fault: Option<Fault>,
+    /// Most periods in a row for which a channel is bridged.
+    pub longest: u32,
+}
+
+impl Checks {
+    /// Channels of one kind: the values are checked, and what the first low-pass lets through is returned.
+    #[inline(never)]
+    pub fn passed<T: Real, const K: usize>(
+        &mut self,
+        channels: &mut [Channel<T>; K],
+        values: Option<&[T; K]>,
+        farthest: T,
+        cutoff: &Cutoff<T>,
+    ) -> [Smooth<T>; K] {
+        from_fn(|i| self.passed_one(&mut channels[i], values.map(|v| v[i]), farthest, cutoff))
+    }
+
+    #[inline]
+    fn passed_one<T: Real>(
+        &mut self,
+        channel: &mut Channel<T>,
+        value: Option<T>,
+        farthest: T,
+        cutoff: &Cutoff<T>,
+    ) -> Smooth<T> {
+        let found = channel.fault(value, farthest, self.frozen_after);
+        self.fault = self.fault.or(found);
+        let good = if found.is_some() { None } else { value };
+        let smooth = channel.step(good, cutoff);
+        if good.is_none() {
+            self.longest = self.longest.max(channel.bridged);
+        }
+        smooth
     }
 }

@@ -23,7 +23,7 @@ pub use estimate::{Decision, Estimate, Health};
 pub use sample::{Sample, SampleStatus};
 pub use settings::Settings;
 
-use channel::{Channel, Smooth};
+use channel::{Channel, Checks, restart, values};
 use information::{Information, Row};
 use schedule::Work;
 use settings::Tuning;
@@ -178,7 +178,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             last: self.last,
             excess: self.excess(),
             residual: self.usual,
-            age: T::of_count(u64::from(self.age)) * self.tuning.period,
+            age: T::of_count(self.age) * self.tuning.period,
             restarts: self.restarts,
         }
     }
@@ -255,47 +255,40 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         // What the arm cannot have is bridged like what is not there.
         let implausible = sample.is_some_and(|s| !self.tuning.plausible(s));
         let sample = sample.filter(|_| !implausible);
-        let mut fault = implausible.then_some(Fault::Implausible);
         let [turn, load] = self.tuning.farthest;
-        let mut longest = 0;
-        let mut pass = |channel: &mut Channel<T>, value: Option<T>, farthest: T| {
-            let found = channel.fault(value, farthest, frozen_after);
-            fault = fault.or(found);
-            let good = if found.is_some() { None } else { value };
-            let smooth = channel.step(good, &self.tuning.cutoff);
-            if good.is_none() {
-                longest = longest.max(channel.bridged());
-            }
-            smooth
+        let cutoff = &self.tuning.cutoff;
+        let mut checks = Checks {
+            frozen_after,
+            fault: implausible.then_some(Fault::Implausible),
+            longest: 0,
         };
+        let [angles, leads, torques] = &mut self.joints;
+        let of_joints = |kind| sample.map(|s| s.of_joints(kind));
+        let angle = checks.passed(angles, of_joints(0), turn, cutoff);
         // Without a better lead the angles lead themselves.
-        let mut filtered = |kind: usize| -> [Smooth<T>; N] {
-            let farthest = if kind < 2 { turn } else { load };
-            from_fn(|j| {
-                let value = sample.map(|s| s.of_joint(kind, j));
-                pass(&mut self.joints[kind][j], value, farthest)
-            })
+        let own;
+        let (leads, lead) = if self.led {
+            own = checks.passed(leads, of_joints(1), turn, cutoff);
+            (leads, &own)
+        } else {
+            (&mut *angles, &angle)
         };
-        let angle = filtered(0);
-        let lead = if self.led { filtered(1) } else { angle };
-        let torque = filtered(2);
-        let hand: [Smooth<T>; 3] =
-            from_fn(|c| pass(&mut self.hand[c], sample.map(|s| s.of_hand(c)), load));
+        let rates: [[T; 2]; N] = from_fn(|j| leads[j].rates(&lead[j], cutoff));
+        let torque = checks.passed(torques, of_joints(2), load, cutoff);
+        let of_hand = sample.map(Sample::of_hand);
+        let hand = checks.passed(&mut self.hand, of_hand.as_ref(), load, cutoff);
+        let Checks { fault, longest, .. } = checks;
         if longest > self.tuning.longest_gap {
             self.running = false;
         }
         let pace = self.tuning.pace;
-        let cutoff = &self.tuning.cutoff;
-        let [angles, leads, torques] = &mut self.joints;
-        let leads = if self.led { leads } else { &mut *angles };
-        let rates: [[T; 2]; N] = from_fn(|j| leads[j].rates(&lead[j], cutoff));
         let (motion, measured) = (&mut self.motion, &mut self.measured);
-        motion.q = joints(from_fn(|j| angles[j].value(&angle[j], cutoff)));
+        motion.q = joints(values(angles, &angle, cutoff));
         motion.qd = joints(rates.map(|[rate, _]| rate * pace));
         motion.qdd = joints(rates.map(|[_, rate]| rate * pace.squared()));
-        measured.torque = joints(from_fn(|j| torques[j].value(&torque[j], cutoff)));
-        measured.force_on_arm = from_fn(|c| self.hand[c].value(&hand[c], cutoff));
-        measured.moment_on_arm = self.hand[2].value(&hand[2], cutoff);
+        measured.torque = joints(values(torques, &torque, cutoff));
+        let [y, z, moment] = values(&mut self.hand, &hand, cutoff);
+        (measured.force_on_arm, measured.moment_on_arm) = ([y, z], moment);
         self.moving = motion.qd.iter().any(|qd| qd.abs() > self.tuning.dead_band);
         self.equation
             .advance(motion, &mut self.memory, self.tuning.period);
@@ -341,6 +334,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     }
 
     /// Restarts all filters at a sample.
+    #[cold]
+    #[inline(never)]
     fn start(&mut self, sample: Option<&Sample<T, N>>) -> SampleStatus {
         let Some(sample) = sample else {
             return SampleStatus::Refused(Fault::Missing);
@@ -350,13 +345,9 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
         let mut good = true;
         for (kind, channels) in self.joints.iter_mut().enumerate() {
-            for (j, channel) in channels.iter_mut().enumerate() {
-                good &= channel.restart(sample.of_joint(kind, j));
-            }
+            good &= restart(channels, sample.of_joints(kind));
         }
-        for (c, channel) in self.hand.iter_mut().enumerate() {
-            good &= channel.restart(sample.of_hand(c));
-        }
+        good &= restart(&mut self.hand, &sample.of_hand());
         if !good {
             return SampleStatus::Refused(Fault::NotFinite);
         }

@@ -71,21 +71,20 @@ impl<T: Real, const N: usize> Sample<T, N> {
         all.all(|v| v.is_finite()) && self.measured.moment_on_arm.is_finite()
     }
 
-    /// Angle, leading angle or torque of a joint.
-    pub(super) fn of_joint(&self, kind: usize, j: usize) -> T {
-        match kind {
-            0 => self.q[j],
-            1 => self.lead.as_ref().unwrap_or(&self.q)[j],
-            _ => self.measured.torque[j],
-        }
+    /// Angles, leading angles or torques of the joints.
+    pub(super) fn of_joints(&self, kind: usize) -> &[T; N] {
+        let values = match kind {
+            0 => &self.q,
+            1 => self.lead.as_ref().unwrap_or(&self.q),
+            _ => &self.measured.torque,
+        };
+        let [values] = &values.data.0;
+        values
     }
 
-    /// A force or the moment at the hand.
-    pub(super) fn of_hand(&self, channel: usize) -> T {
-        match channel {
-            0 => self.measured.force_on_arm[0],
-            1 => self.measured.force_on_arm[1],
-            _ => self.measured.moment_on_arm,
-        }
+    /// Forces and moment at the hand.
+    pub(super) fn of_hand(&self) -> [T; 3] {
+        let [y, z] = self.measured.force_on_arm;
+        [y, z, self.measured.moment_on_arm]
     }
 }

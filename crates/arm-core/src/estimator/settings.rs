@@ -5,7 +5,7 @@ use super::sample::Sample;
 use super::schedule::budget;
 use crate::check::{SMALLEST, at_least_zero, finite, ordered, positive};
 use crate::scalar::Real;
-use crate::{Chain, Invalid};
+use crate::{Chain, Invalid, Joints};
 
 /// How an estimator works. Made by [`Settings::new`]; every guard has a finite value that fits the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,6 +133,8 @@ pub(super) struct Tuning<T, const N: usize> {
     pub refresh: T,
 }
 
+/// What is positive, infinite too.
+const POSITIVE: [f64; 2] = [SMALLEST, f64::INFINITY];
 /// Longest time that is bridged by going on as before \[s\].
 const LONGEST_GAP: f64 = 0.02;
 /// Time after which restarted filters have settled, in periods of their cutoff.
@@ -153,13 +155,10 @@ impl<T: Real, const N: usize> Tuning<T, N> {
         positive("control period", 0, s.period)?;
         finite("control period", 0, s.period)?;
         positive("cutoff", 0, s.cutoff)?;
-        in_range(
-            "cutoff in units of the sampling rate",
-            cutoff * period,
-            0.0,
-            0.45,
-        )?;
-        in_range("control periods in a window", window / period, 2.0, 1e6)?;
+        let name = "cutoff in units of the sampling rate";
+        in_range(name, 0, cutoff * period, [0.0, 0.45])?;
+        let name = "control periods in a window";
+        in_range(name, 0, window / period, [2.0, 1e6])?;
         for (index, &noise) in s.noise.iter().enumerate() {
             positive("noise of joint", index, noise)?;
         }
@@ -172,12 +171,12 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             ("freezing time", s.frozen_after),
             ("time of forgetting", s.forgetting),
         ] {
-            in_range(name, value, SMALLEST, f64::INFINITY)?;
+            in_range(name, 0, value, POSITIVE)?;
         }
         at_least_zero("dead band", 0, s.dead_band)?;
         for (index, (&range, &envelope)) in s.range.iter().zip(&s.envelope).enumerate() {
             ordered("range of joint", index, range)?;
-            positive_or_infinite("envelope of joint", index, envelope)?;
+            in_range("envelope of joint", index, envelope, POSITIVE)?;
         }
 
         let (sin, cos) = (T::of(core::f64::consts::PI) * cutoff * period).sin_cos();
@@ -205,7 +204,7 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             window: length,
             stride,
             rows,
-            enough: periods(T::of(ENOUGH) * T::of_count(u64::from(rows))).max(1),
+            enough: periods(T::of(ENOUGH) * T::of_count(rows)).max(1),
             noise: s.noise,
             weight: s.noise.map(|noise| T::ONE / noise.squared()),
             dead_band: s.dead_band,
@@ -221,7 +220,7 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             budget: budget([N, unknowns], free),
             fade: forgotten,
             // One of the unknowns in turn, so that each comes back at the pace at which it fades.
-            refresh: (T::ONE - forgotten) * T::of_count(unknowns as u64),
+            refresh: (T::ONE - forgotten) * T::of_count(unknowns as u32),
         })
     }
 }
@@ -239,39 +238,25 @@ fn quarantine(frozen: u32, length: u32) -> u32 {
 /// Counted up; an infinite time is as many periods as can be counted.
 fn periods<T: Real>(count: T) -> u32 {
     let whole = count.whole();
-    whole.saturating_add(u32::from(T::of_count(u64::from(whole)) < count))
+    whole.saturating_add(u32::from(T::of_count(whole) < count))
 }
 
-fn positive_or_infinite<T: Real>(
+#[inline(never)]
+fn in_range<T: Real>(
     name: &'static str,
     index: usize,
-    value: T,
+    found: T,
+    [min, max]: [f64; 2],
 ) -> Result<(), Invalid> {
-    match in_range(name, value, SMALLEST, f64::INFINITY) {
-        Err(Invalid::OutOfRange {
-            found, min, max, ..
-        }) => Err(Invalid::OutOfRange {
-            name,
-            index,
-            found,
-            min,
-            max,
-        }),
-        Err(_) => Err(Invalid::NotFinite { name, index }),
-        Ok(()) => Ok(()),
-    }
-}
-
-fn in_range<T: Real>(name: &'static str, found: T, min: f64, max: f64) -> Result<(), Invalid> {
     if found.within(min, max) {
         return Ok(());
     }
     if found.partial_cmp(&T::ZERO).is_none() {
-        return Err(Invalid::NotFinite { name, index: 0 });
+        return Err(Invalid::NotFinite { name, index });
     }
     Err(Invalid::OutOfRange {
         name,
-        index: 0,
+        index,
         found: found.to_f64(),
         min,
         max,
@@ -281,20 +266,17 @@ fn in_range<T: Real>(name: &'static str, found: T, min: f64, max: f64) -> Result
 impl<T: Real, const N: usize> Tuning<T, N> {
     /// Whether the arm can have these values. What is NaN is judged elsewhere.
     pub(super) fn plausible(&self, sample: &Sample<T, N>) -> bool {
-        let mut good = true;
-        for (j, [min, max]) in self.range.iter().enumerate() {
-            for angles in core::iter::once(&sample.q).chain(&sample.lead) {
-                good &= !(angles[j] < *min || angles[j] > *max);
-            }
-        }
+        let within = |angles: &Joints<T, N>| {
+            let mut pairs = angles.iter().zip(&self.range);
+            pairs.all(|(q, [min, max])| !(q < min || q > max))
+        };
         let [force, torque] = self.largest;
         let measured = &sample.measured;
-        let forces = measured.force_on_arm.iter().map(|f| (f.abs(), force));
-        let torques = measured
-            .torque
-            .iter()
-            .chain(core::iter::once(&measured.moment_on_arm));
-        let mut all = forces.chain(torques.map(|t| (t.abs(), torque)));
-        good && !all.any(|(found, most)| found > most)
+        let beyond = |value: &T, most: T| value.abs() > most;
+        within(&sample.q)
+            && sample.lead.as_ref().is_none_or(within)
+            && !measured.torque.iter().any(|t| beyond(t, torque))
+            && !measured.force_on_arm.iter().any(|f| beyond(f, force))
+            && !beyond(&measured.moment_on_arm, torque)
     }
 }

@@ -32,6 +32,8 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
     }
 
     /// Adds the row of a joint.
+    // Once in the code, not for each joint.
+    #[inline(never)]
     pub fn add(&mut self, joint: usize, columns: &[T; P], value: T) {
         if joint >= N {
             return;
@@ -58,7 +60,7 @@ impl<T: Real, const N: usize, const P: usize> Window<T, N, P> {
             return None;
         }
         let (columns, value) = (self.columns.get(joint)?, *self.values.get(joint)?);
-        let [count, full] = [count, tuning.rows].map(|n| T::of_count(u64::from(n)));
+        let [count, full] = [count, tuning.rows].map(T::of_count);
         let share = T::ONE / count;
         let weight = *tuning.weight.get(joint)? * count / full;
         Some(Row {

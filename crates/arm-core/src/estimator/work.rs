@@ -3,7 +3,7 @@
 use super::information::Row;
 use super::schedule::{Work, split};
 use super::{Decision, Estimate, Estimator};
-use crate::covariance::{Covariance, copy_triangle};
+use crate::covariance::copy_triangle;
 use crate::scalar::Real;
 
 /// Share of the prior's variance that the data must have taken away before an unknown counts as identified.
@@ -16,14 +16,15 @@ const MOST_CORRELATED: f64 = 0.9;
 impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P, E> {
     /// What a period can afford of the work on the full window, at least one unit.
     pub(super) fn work(&mut self) {
-        let mut left = self.tuning.budget;
+        let (mut left, mut first) = (self.tuning.budget, true);
         loop {
             let cost = self.work.cost([N, P]);
-            self.work_once();
-            left = left.saturating_sub(cost);
-            if self.work == Work::Idle || self.work.cost([N, P]) > left {
+            if !first && (self.work == Work::Idle || cost > left) {
                 return;
             }
+            self.work_once();
+            left = left.saturating_sub(cost);
+            first = false;
         }
     }
 
@@ -142,7 +143,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         for (estimate, prior) in self.estimates.iter_mut().zip(&self.priors) {
             *estimate = Estimate::of_prior(prior);
         }
-        self.covariance = Covariance::independent(self.priors.map(|p| p.sd));
+        self.covariance.restart(self.priors.iter().map(|p| p.sd));
         self.residual = [T::ZERO; 2];
         self.last_residual = [None; N];
         self.judged = T::ZERO;
@@ -156,8 +157,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         for i in 0..P {
             let prior = &self.priors[i];
             self.estimates[i].value = self.solution[i].max(prior.min).min(prior.max);
+            self.deviations[i] = (T::ONE / self.information.d[i]).sqrt();
         }
-        self.deviations = self.information.d.map(|d| (T::ONE / d).sqrt());
         self.judged = (self.judged + T::ONE).min(T::of(LONG));
         let (mut square, mut product, mut count) = (T::ZERO, T::ZERO, T::ZERO);
         for j in 0..N {

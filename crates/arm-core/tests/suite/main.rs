@@ -16,6 +16,8 @@ mod lanes;
 mod monitor;
 mod newton_euler;
 mod online;
+#[cfg(feature = "own")]
+mod own;
 mod pendulum;
 mod robot;
 mod scalar;

@@ -1,12 +1,12 @@
 //! State in storage that the caller owns.
 
-use crate::status::{ARMRS_NOT_INITIALISED, armrs_status};
+use crate::armrs_status::{self, ARMRS_NOT_INITIALISED};
 
 /// Opaque storage of a fixed size for a state of type `Inner`.
 ///
 /// # Safety
 /// `storage` points to memory of the struct itself that is large enough and aligned for an `Inner`.
-pub(crate) unsafe trait Held: Sized {
+pub unsafe trait Held: Sized {
     /// What is kept.
     type Inner: Copy;
     /// A number that says that it is there; different for each type.

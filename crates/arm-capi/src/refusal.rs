@@ -1,38 +1,11 @@
+//! What a function that makes something says of what it refuses.
+
 use core::ffi::c_char;
 
 use arm_core::Invalid;
+use arm_period::armrs_status::{self, *};
 
 use crate::armrs_real;
-
-/// What a call came to.
-#[repr(i32)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum armrs_status {
-    /// Done.
-    ARMRS_OK = 0,
-    /// A pointer is null.
-    ARMRS_NULL = 1,
-    /// A struct was not made by its `_init` function.
-    ARMRS_NOT_INITIALISED = 2,
-    /// A value that was given is NaN or infinite, or makes a result so; nothing was written.
-    ARMRS_NOT_FINITE = 3,
-    /// A value or a number of things is outside what is allowed.
-    ARMRS_OUT_OF_RANGE = 4,
-    /// The robot does not reach the point.
-    ARMRS_OUT_OF_REACH = 5,
-    /// No effect has this name or number.
-    ARMRS_UNKNOWN = 6,
-    /// The monitor has stopped the device.
-    ARMRS_STOPPED = 7,
-    /// An effect acts on the rig or the sensors, or depends on muscle activity: an arm alone has none.
-    ARMRS_CANNOT_ACT = 8,
-    /// An arm that cannot be: a tonne, a centre of mass far beyond its segment.
-    ARMRS_IMPLAUSIBLE = 9,
-    /// A torque farther from that of the arm that was expected than `envelope` allows; nothing was written.
-    ARMRS_UNTRUSTED = 10,
-    /// Memory that was sealed has changed.
-    ARMRS_CORRUPT = 11,
-}
 
 /// Length of `armrs_problem.what`, its final zero included.
 pub const ARMRS_WHAT: usize = 56;
@@ -53,8 +26,6 @@ pub struct armrs_problem {
     /// Largest value allowed.
     pub max: armrs_real,
 }
-
-pub(crate) use armrs_status::*;
 
 /// Why a state is not made.
 pub(crate) struct Refusal {
@@ -160,78 +131,4 @@ fn tell(why: &Refusal, problem: Option<&mut armrs_problem>) -> armrs_status {
         }
     }
     why.status
-}
-
-impl From<Invalid> for armrs_status {
-    fn from(invalid: Invalid) -> Self {
-        match invalid {
-            Invalid::NotFinite { .. } => ARMRS_NOT_FINITE,
-            Invalid::OutOfReach { .. } => ARMRS_OUT_OF_REACH,
-            Invalid::Unknown { .. } => ARMRS_UNKNOWN,
-            Invalid::CannotAct { .. } => ARMRS_CANNOT_ACT,
-            _ => ARMRS_OUT_OF_RANGE,
-        }
-    }
-}
-
-/// Turns a result of the body of a function into its status.
-pub(crate) fn ended(result: Result<(), armrs_status>) -> armrs_status {
-    match result {
-        Ok(()) => ARMRS_OK,
-        Err(status) => status,
-    }
-}
-
-/// A result that may be written. One that is not finite never reaches a motor: it comes from a value that was not, or from one
-/// beyond all numbers.
-pub(crate) fn finite<const N: usize>(
-    result: [armrs_real; N],
-) -> Result<[armrs_real; N], armrs_status> {
-    // Zero times a number is zero, times NaN or an infinity NaN: one operation for each, and one look.
-    let sum = result.iter().fold(0.0, |sum, &value| sum + 0.0 * value);
-    if sum == 0.0 {
-        Ok(result)
-    } else {
-        Err(ARMRS_NOT_FINITE)
-    }
-}
-
-/// A reference to what a caller's pointer points to.
-///
-/// # Safety
-/// A pointer that is not null is aligned and points to a `T` that nobody writes during the call.
-pub(crate) unsafe fn given<'a, T>(pointer: *const T) -> Result<&'a T, armrs_status> {
-    // SAFETY: as promised by the caller.
-    unsafe { pointer.as_ref() }.ok_or(ARMRS_NULL)
-}
-
-/// Numbers that a caller's pointer points to.
-///
-/// # Safety
-/// As of [`given`], for `N` of them.
-pub(crate) unsafe fn numbers<'a, const N: usize>(
-    pointer: *const armrs_real,
-) -> Result<&'a [armrs_real; N], armrs_status> {
-    // SAFETY: as promised by the caller; an array has the alignment of its elements.
-    unsafe { given(pointer.cast()) }
-}
-
-/// Places for numbers that a caller's pointer points to.
-///
-/// # Safety
-/// As of [`place`], for `N` of them.
-pub(crate) unsafe fn places<'a, const N: usize>(
-    pointer: *mut armrs_real,
-) -> Result<&'a mut [armrs_real; N], armrs_status> {
-    // SAFETY: as promised by the caller.
-    unsafe { place(pointer.cast()) }
-}
-
-/// A place that a caller's pointer points to.
-///
-/// # Safety
-/// A pointer that is not null is aligned and points to a `T` that nobody else uses during the call.
-pub(crate) unsafe fn place<'a, T>(pointer: *mut T) -> Result<&'a mut T, armrs_status> {
-    // SAFETY: as promised by the caller.
-    unsafe { pointer.as_mut() }.ok_or(ARMRS_NULL)
 }
