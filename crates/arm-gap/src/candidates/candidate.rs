@@ -72,6 +72,11 @@ impl Candidate {
         is_plainer(&self.refined, effect)
     }
 
+    /// Whether nothing of what it asks for is in an effect.
+    pub fn is_nothing(&self, effect: &Effect<f64>) -> bool {
+        self.free.iter().all(|&p| effect.parameters[p] == 0.0)
+    }
+
     /// Whether it is about the same kind at the same place.
     pub fn is_same_effect(&self, effect: &Effect<f64>) -> bool {
         self.effect.kind == effect.kind && self.effect.index == effect.index
@@ -300,6 +305,19 @@ pub(super) fn expected<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_slip_in_one_direction_is_something_and_a_spring_without_stiffness_nothing() {
+        let of = |kind, free: &[usize]| Candidate {
+            free: free.to_vec(),
+            ..Candidate::about(Effect::new(kind, 0))
+        };
+        let slip = of(Kind::HandleSlip, &[0, 1]);
+        assert!(!slip.is_nothing(&Effect::new(Kind::HandleSlip, 0).with(&[0.0, 0.002])));
+        let spring = of(Kind::Relaxation, &[0]);
+        assert!(spring.is_nothing(&Effect::new(Kind::Relaxation, 0).with(&[0.0, 2.4])));
+        assert!(!spring.is_nothing(&Effect::new(Kind::Relaxation, 0).with(&[0.1, 2.4])));
+    }
 
     #[test]
     fn two_laws_of_a_family_in_one_joint_are_kin() {

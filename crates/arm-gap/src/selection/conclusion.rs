@@ -12,6 +12,7 @@ use crate::selection::model_selection::Named;
 use crate::selection::passive_base::BaseLaw;
 use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep, Settled};
 use crate::selection::set_apart::SetApart;
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 
 /// What was found.
@@ -39,6 +40,18 @@ pub struct Finding<const N: usize> {
     pub scale: f64,
 }
 
+/// What is known of the amended model.
+struct Known<const N: usize> {
+    /// The model.
+    amended: Fitted<N>,
+    /// Its misfit with the noise that the search had.
+    cost: f64,
+    /// How well its numbers are known.
+    precision: Precision,
+    /// What it leaves.
+    lack: LackOfFit,
+}
+
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Judges the passive base, and measures what is left.
     pub(crate) fn concluded(
@@ -60,24 +73,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             ..
         } = state;
         progress("measuring what is left", 0.9)?;
-        let alone = self.precision(&point, &amended, scale)?;
-        let mut precision = widened(
-            &alone,
-            &amended,
-            &named,
-            (self.session.effects.len(), &base),
-        );
         let gained: Vec<f64> = base.iter().map(|law| law.gain).collect();
         if let Some(rigid) = self.rigid(&gained) {
             (calibrated, before) = rigid;
         }
-        let lack = [before, lack_of_fit(self, &point, &amended)];
-        let explained = (calibrated.cost - amended.cost) / scale;
-        if self.repeated {
-            let other;
-            (amended, other) = self.weighed_by_what_is_left((amended, point))?;
-            precision = precision.with_noise(&alone, other);
-        }
+        let known = self.known((amended, point), &mut named, (&base, scale))?;
+        let (lack, cost, mut precision) = (known.lack, known.cost, known.precision);
+        amended = known.amended;
+        let explained = (calibrated.cost - cost) / scale;
         if let Some((hypothesis, _)) = self.refined(&calibrated) {
             calibrated.hypothesis = hypothesis;
         }
@@ -103,7 +106,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             in_trials,
             search_trace,
             precision,
-            lack,
+            lack: [before, lack],
             ruled,
             scale,
         })
@@ -141,16 +144,61 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok((state, named, base))
     }
 
+    /// What is known of the amended model, with the noise of all fitted trials where there are repeats. A name that comes to nothing then is
+    /// none.
+    fn known(
+        &mut self,
+        (amended, point): Settled<'a, N>,
+        named: &mut Vec<Named>,
+        (base, scale): (&[BaseLaw<N>], f64),
+    ) -> Result<Known<N>, GapError> {
+        let alone = self.precision(&point, &amended, scale)?;
+        let first = self.session.effects.len();
+        let precision = widened(&alone, &amended, named, (first, base));
+        let known = Known {
+            lack: lack_of_fit(self, &point, &amended),
+            cost: amended.cost,
+            amended,
+            precision,
+        };
+        if !self.repeated {
+            return Ok(known);
+        }
+        let before = self.clone();
+        let (weighed, other) = self.weighed_by_what_is_left((&known.amended, point))?;
+        let Some(slot) = weighed.comes_to_nothing() else {
+            return Ok(Known {
+                amended: weighed,
+                precision: known.precision.with_noise(&alone, other),
+                ..known
+            });
+        };
+        *self = before;
+        let Fitted {
+            mut hypothesis,
+            mut asked,
+            ..
+        } = known.amended;
+        hypothesis.named.remove(slot);
+        asked.remove(slot);
+        named.retain(|one| one.slot != slot);
+        for one in named.iter_mut().filter(|one| one.slot > slot) {
+            one.slot -= 1;
+        }
+        let settled = self.settle(hypothesis, asked)?;
+        self.known(settled, named, (base, scale))
+    }
+
     /// The amended model refitted with the noise of all fitted trials, and how well it is known then.
     ///
     /// Of slow noise the differences of few repeats hold few independent samples, and what they say of it is what they happen to.
     fn weighed_by_what_is_left(
         &mut self,
-        (amended, point): Settled<'a, N>,
+        (amended, point): (&Fitted<N>, LinearizationPoint<'a, N>),
     ) -> Result<(Fitted<N>, Precision), GapError> {
-        self.measure_noise_left(&point, &amended)?;
+        self.measure_noise_left(&point, amended)?;
         let again = self.settle(amended.hypothesis.clone(), amended.asked.clone());
-        let (amended, point) = again.unwrap_or((amended, point));
+        let (amended, point) = again.unwrap_or_else(|_| (amended.clone(), point));
         let precision = self.precision(&point, &amended, 1.0)?;
         Ok((amended, precision))
     }

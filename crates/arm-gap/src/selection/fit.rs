@@ -57,6 +57,12 @@ impl<const N: usize> Fitted<N> {
         self.cost >= MUCH * self.rows as f64
     }
 
+    /// The place of a named effect that does nothing as it was fitted.
+    pub(crate) fn comes_to_nothing(&self) -> Option<usize> {
+        let mut named = std::iter::zip(&self.asked, &self.hypothesis.named);
+        named.position(|(asked, effect)| asked.is_nothing(effect))
+    }
+
     /// Whether a named effect has come to a shape in which it is another, plainer law.
     pub(crate) fn has_plainer(&self) -> bool {
         self.plainer().next().is_some()
