@@ -22,7 +22,7 @@ from armrs.workflows.gap.results import gap_data, write_gap
 from armrs.workflows.gap.shapes import portrait
 from armrs.workflows.gap.suspicion import _still_joints, examine, refuse_mislabelled
 from browser import opened
-from gap_sessions import session
+from gap_sessions import session, session_of_three_joints
 from markup import unescaped
 
 
@@ -292,6 +292,14 @@ def test_what_a_trial_without_robot_angles_costs_is_said(tmp_path: Path, capsys:
     [line] = examine(none, led=False)
     assert line.startswith("no robot angles (qr1, qr2): so all trials are compared by joint torques in measured motion")
     assert examine(data, led=True) == []
+
+
+def test_friction_that_shows_near_rest_alone_is_found_where_rest_is_left_out() -> None:
+    """Of three joints rest is left out once one of them is dry; with it, Stribeck's law was lost again."""
+    hidden = armrs.Effect("stribeck", 1, parameters={"torque": 0.1, "speed": 0.06})
+    [effect] = armrs.find_gap(session_of_three_joints(hidden), threads=2).effects
+    assert effect.kind == "stribeck" and effect.joint == 1
+    assert effect.parameters["torque"].value == pytest.approx(0.1, rel=0.2)
 
 
 def test_without_repeats_a_movement_that_separates_rivals_is_found() -> None:
