@@ -47,7 +47,7 @@ def test_every_published_crate_carries_its_licences() -> None:
     published = [
         path.parent for path in (ROOT / "crates").glob("*/Cargo.toml") if "publish.workspace = true" in path.read_text(encoding="utf-8")
     ]
-    assert len(published) == 9
+    assert len(published) == 10
     for crate in published:
         for name in ("LICENSE-MIT", "LICENSE-APACHE"):
             assert (crate / name).read_bytes() == (ROOT / name).read_bytes(), crate.name
