@@ -19,6 +19,7 @@ BLOCK = re.compile(r"^```(\w+)(?: ([^\n]+))?\n(.*?)^```", flags=re.M | re.S)
 TARGET = "thumbv7em-none-eabihf"
 TOOLS = {
     "cargo": "from rustup",
+    "cc": "Debian: gcc",
     "arm-none-eabi-gcc": "Debian: gcc-arm-none-eabi",
     "qemu-system-arm": "Debian: qemu-system-arm",
     "make": "Debian: make",
@@ -74,7 +75,7 @@ def main() -> int:
     if done.returncode or missing or not promised:
         print(f"walkthrough: status {done.returncode}, not printed as it says: {missing}; printed:\n{done.stdout}", file=sys.stderr)
         return 1
-    print("walkthrough: docs/firmware.md from an empty folder to a running image, with Make and with CMake")
+    print("walkthrough: docs/firmware.md from an empty folder to a running image, with Make, with CMake and on this computer")
     return 0
 
 

@@ -23,7 +23,7 @@ def export_c(
     out: OutFolder,
     precision: Annotated[Precision, typer.Option(help="Of the library that the firmware links.")] = Precision.double,
     identified: Annotated[
-        Path | None, typer.Option("--identified", metavar="FILE", help="JSON of armrs identify, for the standard deviations.")
+        Path | None, typer.Option("--identified", metavar="FILE", help="JSON of armrs identify, for the covariance.")
     ] = None,
     json: JsonFile = None,
 ) -> None:
