@@ -164,7 +164,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if !self.repeated {
             return Ok(known);
         }
-        let before = self.clone();
+        let before = self.noise.clone();
         let (weighed, other) = self.weighed_by_what_is_left((&known.amended, point))?;
         let Some(slot) = weighed.comes_to_nothing() else {
             return Ok(Known {
@@ -173,7 +173,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 ..known
             });
         };
-        *self = before;
+        self.noise = before;
         let Fitted {
             mut hypothesis,
             mut asked,
