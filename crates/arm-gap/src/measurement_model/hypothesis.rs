@@ -62,6 +62,13 @@ pub struct Coordinate {
     pub step: f64,
 }
 
+impl Coordinate {
+    /// Whether a value is as small or as large as is allowed.
+    pub fn is_at_limit(&self, value: f64) -> bool {
+        value <= self.lower || value >= self.upper
+    }
+}
+
 impl<const N: usize> Hypothesis<N> {
     /// The value of a number.
     pub fn get(&self, target: Target) -> f64 {

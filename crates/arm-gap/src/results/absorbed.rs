@@ -28,12 +28,52 @@ pub(super) fn absorbed<'c, const N: usize>(
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Vec<Absorbed> {
     let modelled = model.all_effects();
-    let each = unknowns.filter_map(|c| {
-        let promised = 2.0 * c.prior.map_or(f64::INFINITY, |(_, sd)| sd);
-        let value = hypothesis.get(c.target);
-        one(&modelled, hypothesis, c.target, (value, promised))
-    });
+    let each = unknowns.filter_map(|c| told(&modelled, hypothesis, c));
     each.collect()
+}
+
+/// A warning of what was refitted as far as it may be, beyond what was promised of it: what it could not take up may stand in what is
+/// named. `None` without any.
+pub(super) fn stopped<'c, const N: usize>(
+    model: &Model,
+    hypothesis: &Hypothesis<N>,
+    unknowns: impl Iterator<Item = &'c Coordinate>,
+) -> Option<String> {
+    let modelled = model.all_effects();
+    let far = unknowns.filter(|c| c.is_at_limit(hypothesis.get(c.target)));
+    let words: Vec<String> = far
+        .filter_map(|c| told(&modelled, hypothesis, c))
+        .filter(|a| a.value.abs() > a.promised)
+        .map(|a| {
+            let (value, promised) = (in_unit(a.value, &a.unit), in_unit(a.promised, &a.unit));
+            format!("{} by {value} where {promised} was promised", a.name)
+        })
+        .collect();
+    (!words.is_empty()).then(|| {
+        format!(
+            "refitted as far as is allowed: {}. What this could not take up may stand in a name: look at what the model and [tolerance] say \
+             of it",
+            words.join("; ")
+        )
+    })
+}
+
+/// A value with its unit; a relative one in per cent.
+fn in_unit(value: f64, unit: &str) -> String {
+    match unit {
+        RELATIVE => format!("{:.3} %", 100.0 * value),
+        _ => format!("{value:.1e} {unit}"),
+    }
+}
+
+fn told<const N: usize>(
+    modelled: &[Effect],
+    hypothesis: &Hypothesis<N>,
+    unknown: &Coordinate,
+) -> Option<Absorbed> {
+    let promised = 2.0 * unknown.prior.map_or(f64::INFINITY, |(_, sd)| sd);
+    let value = hypothesis.get(unknown.target);
+    one(modelled, hypothesis, unknown.target, (value, promised))
 }
 
 fn one<const N: usize>(
@@ -143,5 +183,19 @@ mod tests {
         assert_eq!((told[1].unit.as_str(), told[1].value), ("m", 0.003));
         assert!((told[2].value - 0.1).abs() < 1e-12 && (told[2].promised - 0.1).abs() < 1e-12);
         assert_eq!(told[2].unit, RELATIVE);
+
+        // Nothing is far; then the place of the robot is as far as is allowed, and alone is told.
+        assert_eq!(stopped(&model, &hypothesis, unknowns.iter()), None);
+        let mut bounded = unknowns;
+        (bounded[0].upper, bounded[1].upper) = (0.02, 0.003);
+        // As far as is allowed, and yet within what was promised.
+        assert_eq!(stopped(&model, &hypothesis, bounded.iter()), None);
+        bounded[1].prior = Some((0.0, 0.001));
+        let told = stopped(&model, &hypothesis, bounded.iter()).expect("a warning");
+        assert!(
+            told.contains("place of the robot, z by 3.0e-3 m where 2.0e-3 m was promised."),
+            "{told}"
+        );
+        assert!(!told.contains("mass"), "{told}");
     }
 }

@@ -4,7 +4,7 @@ use arm_model::{Effect, Model, Refused};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-use super::absorbed::absorbed;
+use super::absorbed::{absorbed, stopped};
 use super::channel_gap::channel_gaps;
 use super::limit::limits;
 use super::{
@@ -127,6 +127,7 @@ impl GapResult {
             .collect();
         let amended = Fitted::of(&finding.amended.hypothesis);
         let unknowns = finding.precision.coordinates.iter();
+        let refitted_far = stopped(asked.model, &finding.amended.hypothesis, unknowns.clone());
         Ok(Self {
             verdict,
             places: Vec::new(),
@@ -142,7 +143,10 @@ impl GapResult {
             absorbed: absorbed(asked.model, &finding.amended.hypothesis, unknowns),
             lack: finding.lack.each_ref().map(Lack::from),
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
-            warnings: held_in_motion(prepared.session),
+            warnings: held_in_motion(prepared.session)
+                .into_iter()
+                .chain(refitted_far)
+                .collect(),
             model: amended.amended(asked.model, &locked)?,
             calibrated: Fitted::of(&finding.calibrated.hypothesis),
             amended,

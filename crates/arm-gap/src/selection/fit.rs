@@ -466,7 +466,7 @@ pub(crate) fn decided<const N: usize>(
         .filter(|&i| {
             let c = &coordinates[i];
             let value = hypothesis.get(c.target);
-            let inside = value > c.lower && value < c.upper;
+            let inside = !c.is_at_limit(value);
             (inside || c.prior.is_some()) && normal.gram[(i, i)] > 0.0
         })
         .collect();
