@@ -1,8 +1,8 @@
 //! A second derivation: the recursive Newton-Euler algorithm, body by body in the world's axes.
 
 use arm_core::{
-    Chain, Joints, Load, Plane, Pose, contributions, coriolis, forward_dynamics, gravity, inertia,
-    inverse_dynamics, joint_force, static_torque,
+    Chain, Joints, Load, Plane, Pose, Products, Resistance, contributions, coriolis,
+    forward_dynamics, gravity, inertia, inverse_dynamics, joint_force, static_torque,
 };
 
 use crate::common::Random;
@@ -167,4 +167,24 @@ fn three_joints() {
 #[test]
 fn five_joints() {
     agrees::<5>(75);
+}
+
+#[test]
+fn a_column_of_the_resistance_is_one_of_the_inverse_inertia_matrix() {
+    let mut random = Random(29);
+    for _ in 0..STATES {
+        let arm = random.arm::<3>();
+        let pose = Pose::new(&random.joints(3.0));
+        let resistance = Resistance::at(&Products::of(&arm), &pose, &random.joints(3.0));
+        for joint in 0..3 {
+            let torque = inertia(&arm, &pose) * resistance.column(joint);
+            for (i, felt) in torque.iter().enumerate() {
+                let wanted = f64::from(i == joint);
+                assert!(
+                    (felt - wanted).abs() < ROUNDING * 100.0,
+                    "{i} {joint}: {felt}"
+                );
+            }
+        }
+    }
 }
