@@ -181,7 +181,7 @@ def _deviations(z: float) -> str:
 def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what the workflow found."""
     common.head(result, verdict(result))
-    common.show("Missing in the model", missing(result))
+    common.show(heading(result), missing(result))
     for line in (*others(result), *apart(result)):
         print(line)
     common.show("Gap on the test trials, root mean square of simulated less measured", gap(result))
@@ -227,6 +227,11 @@ def suspects(data: Mapping[str, Any], most: int = 10) -> Table:
         sizes = ", ".join(f"{name} {value:.3g}" for name, value in s["parameters"].items())
         rows.append([s["kind"], s["joint"] or s["channel"], f"{sizes} {unit(s['unit'])}".rstrip(), f"{s['gain']:.3g}", f"{s['price']:.3g}"])
     return Table(["effect", "at", "size", "gain", "gain needed"], rows, 3)
+
+
+def heading(data: Mapping[str, Any]) -> str:
+    """Return what stands above the named effects: under `unexplained` they may be no more than what comes nearest."""
+    return "What comes nearest to what is missing" if headline.only_near(data) else "What the model lacks"
 
 
 def missing(data: Mapping[str, Any]) -> Table:
@@ -285,18 +290,14 @@ def gap(data: Mapping[str, Any]) -> Table:
         if channel["before"] is None:
             continue
         channel = {**channel, "last": headline.left(channel)}
-        above = None if None in (channel["floor"], channel["calibrated"]) else channel["calibrated"] - channel["floor"]
-        # Of a gap that hardly lies above the floor there is no share worth a number.
-        counts = above is not None and channel["after"] is not None and above > 0.1 * channel["floor"]
-        # Below the floor there is nothing to close.
-        closed = f"{min((channel['calibrated'] - channel['after']) / above, 1.0):.0%}" if counts else None
+        share = headline.closed(channel)
         quantity, held_in = name.rsplit("_", 1)
         values = [None if channel[step] is None else f"{channel[step]:.3g}" for step in steps]
         rows.append(
             [
                 f"{quantity} [{unit(held_in)}]",
                 *values,
-                *([closed] if named else []),
+                *([None if share is None else f"{share:.0%}"] if named else []),
                 "open" if name in opened else None,
             ]
         )
