@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
 from armrs.workflows.gap.headline import headline, still_open
-from armrs.workflows.gap.summary import marks
+from armrs.workflows.gap.summary import marks, rivals
 from armrs.workflows.gap.words import gap, heading, intervals, left, missing, named, nearest, others, tie
 
 
@@ -73,6 +74,12 @@ def test_an_open_gap_contradicts_no_sentence() -> None:
         assert "off by 0.015 rad, where repeats differ by 0.0019 rad" in said
         assert [row[-1] for row in gap(told).rows] == ["open", "open"]
         assert any("the angle of joint 3 (q3) is open on the test trials" in line for line in left(told))
+
+
+def test_the_sketch_says_where_a_rival_acts_that_acts_elsewhere() -> None:
+    at = [SimpleNamespace(kind="elastic", joint=joint, channel=None) for joint in (2, 1)]
+    torn: Any = SimpleNamespace(joint=2, channel=None, alternatives=at)
+    assert rivals(torn) == ["elastic", "elastic in joint 1"]
 
 
 def test_names_that_leave_the_gap_open_are_what_comes_nearest() -> None:

@@ -14,7 +14,7 @@ from ...report.figures import Drawn
 from ...report.sketch import sketch
 from ...report.tables import number, spread, unit
 from .found import GapFound
-from .headline import largest, left, still_open
+from .headline import largest, left, only_near, place_of, still_open
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +50,8 @@ def summary(result: GapFound) -> Drawn:
     else:
         right.set_axis_off()
         right.text(0.0, 0.5, "There is no test trial to measure the gap on.")
-    return Drawn("summary", "What is missing, and how much of the gap it closes", text, figure, "first")
+    what = "comes nearest" if only_near(result.to_dict()) else "is missing"
+    return Drawn("summary", f"What {what}, and how much of the gap it closes", text, figure, "first")
 
 
 # ---- the arm
@@ -78,12 +79,18 @@ def marks(effect: Missing, kind: Kind) -> list[tuple[str, int]]:
     return [(kind.where if kind.where in _SIGNS else "hand", 0)]
 
 
+def rivals(effect: Missing) -> list[str]:
+    """Return what an effect may be instead, with its place where that is another one."""
+    here = (effect.joint, effect.channel)
+    places = [(a.kind, None, None) if (a.joint, a.channel) == here else (a.kind, a.joint, a.channel) for a in effect.alternatives]
+    return list(dict.fromkeys(place_of(*place) for place in places))
+
+
 def _words(effect: Missing) -> str:
     """Return an effect with its size, and with its rivals where the data do not decide."""
     text = effect.kind.replace("_", " ")
     if getattr(effect, "decided", True) is False:
-        rivals = dict.fromkeys(a.kind.replace("_", " ") for a in effect.alternatives)
-        return f"{text} (or {', '.join(rivals)})"
+        return f"{text} (or {', '.join(rivals(effect))})"
     name = largest({n: {"value": v.value, "std": v.std, "unit": v.unit} for n, v in effect.parameters.items()})
     value = None if name is None else effect.parameters[name]
     if value is not None and value.std is not None:
