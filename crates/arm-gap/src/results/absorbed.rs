@@ -61,29 +61,21 @@ pub(super) fn stopped<'c, const N: usize>(
 /// A value with its unit; a relative one in per cent.
 fn in_unit(value: f64, unit: &str) -> String {
     match unit {
-        RELATIVE => format!("{:.3} %", 100.0 * value),
+        RELATIVE => format!("{:.0} %", 100.0 * value),
         _ => format!("{value:.1e} {unit}"),
     }
 }
 
+/// What was refitted of one unknown; `None` for what is each trial's own, or named.
 fn told<const N: usize>(
     modelled: &[Effect],
     hypothesis: &Hypothesis<N>,
     unknown: &Coordinate,
 ) -> Option<Absorbed> {
-    let promised = 2.0 * unknown.prior.map_or(f64::INFINITY, |(_, sd)| sd);
-    let value = hypothesis.get(unknown.target);
-    one(modelled, hypothesis, unknown.target, (value, promised))
-}
-
-fn one<const N: usize>(
-    modelled: &[Effect],
-    hypothesis: &Hypothesis<N>,
-    target: Target,
-    (mut value, mut promised): (f64, f64),
-) -> Option<Absorbed> {
+    let mut promised = 2.0 * unknown.prior.map_or(f64::INFINITY, |(_, sd)| sd);
+    let mut value = hypothesis.get(unknown.target);
     let axis = |axis: usize| ["y", "z"][axis];
-    let (name, unit) = match target {
+    let (name, unit) = match unknown.target {
         Target::Segment(k, part) => {
             let part = ["mass", "com", "inertia"][part.min(2)];
             (format!("{part} of segment {}", k + 1), RELATIVE)
