@@ -19,8 +19,9 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
+PYTEST := $(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-.PHONY: help demo test bench bench-counts counts bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows crates clean build format rust python
+.PHONY: help demo test test-long bench bench-counts counts bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows crates clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -34,9 +35,12 @@ demo: build ## build, run the main job on built-in data, print where the report 
 
 # The halves side by side, since each leaves a core idle at times; not as jobs of one make, whose job server cargo and the tests
 # would inherit.
-test: $(STAMPS)/venv ## every check: formatting, lints, Rust and Python tests, types, examples
+test: $(STAMPS)/venv ## every check but test-long: formatting, lints, Rust and Python tests, types, examples
 	@unset MAKEFLAGS MFLAGS MAKELEVEL; $(MAKE) rust & half=$$!; $(MAKE) python; other=$$?; wait $$half && exit $$other
 	@echo "make test: everything passed"
+
+test-long: $(STAMPS)/dev ## Python tests of some ten seconds each: the thesis computed again, measured rigs, statistics over many draws
+	$(PYTEST) -m long
 
 build: $(STAMPS)/build ## compile the extension module and install it into .venv
 
@@ -82,7 +86,7 @@ python: $(STAMPS)/dev ## the Python half of `test`
 	$(BIN)/ruff check --quiet python tests scripts examples bench
 	$(BIN)/mypy --no-error-summary
 	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
-	$(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile --no-loadscope-reorder
+	$(PYTEST) -m "not long"
 
 format: $(STAMPS)/dev ## format Rust and Python, mend what lints can mend
 	cargo fmt --all

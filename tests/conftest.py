@@ -16,7 +16,7 @@ import pytest
 
 from browser import shared
 
-LONG = (
+LARGEST = (
     "test_reproduce.py", "test_pages.py", "test_setup_matrix.py", "test_demo.py", "test_fmu_defects.py", "test_sweep.py", "test_first_day.py",
     "test_friction.py", "test_passive_moments.py",
 )  # fmt: skip
@@ -232,4 +232,4 @@ def one_browser() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: item.path.name not in LONG)
+    items.sort(key=lambda item: item.path.name not in LARGEST)

@@ -65,6 +65,7 @@ def test_published_laws_come_back(law: Law, own: tuple[float, float], held: tupl
     assert np.abs(seen - true).max() < 0.05 * np.ptp(true)
 
 
+@pytest.mark.long
 def test_the_linear_law_is_refused_where_it_is_not_enough_and_nowhere_else() -> None:
     def linear(q: np.ndarray, adjacent: float) -> np.ndarray:
         return np.asarray(np.exp(0.07 * (q - 80.0)) - 0.8 * np.exp(-0.08 * (q - 25.0)) + 0.014 * q + 0.017 * adjacent)
@@ -79,6 +80,7 @@ def test_the_linear_law_is_refused_where_it_is_not_enough_and_nowhere_else() -> 
     assert refused[moving] >= 95
 
 
+@pytest.mark.long
 def test_intervals_of_steepness_and_ratio_hold() -> None:
     def law(q: np.ndarray, adjacent: float) -> np.ndarray:
         return np.asarray(np.exp(0.07 * (q + 0.5 * adjacent - 85.0)) - 0.8 * np.exp(-0.08 * (q - 0.3 * adjacent - 25.0)) + 0.014 * q)

@@ -244,6 +244,7 @@ def test_one_trial_says_what_it_cannot_tell(imported: Path) -> None:
     assert wide and all(name in line for name in wide) and line.endswith("record repeats of each movement")
 
 
+@pytest.mark.long
 def test_a_fit_at_the_noise_is_not_called_poor(imported: Path) -> None:
     """28 % of the variation were left in a wrist that hardly resists: noise, as the repeats say."""
     dataset = some(armrs.load_dataset(imported), "elbow", "reach", "raised")

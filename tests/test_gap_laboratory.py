@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import pytest
+
 import armrs
 from armrs.montecarlo.spec import load_sweep
 from armrs.workflows.record import measure
@@ -12,6 +14,7 @@ from armrs.workflows.record import measure
 SWEEP = Path(__file__).parents[1] / "bench" / "sweep" / "little_known" / "SWEEP.toml"
 
 
+@pytest.mark.long
 def test_no_second_dry_law_stands_for_how_joints_creep() -> None:
     """Dry friction in three joints creeps below 0.01 rad/s: a joint for which another speed was chosen showed a load friction as well."""
     experiment = dataclasses.replace(load_sweep(SWEEP), seed=1396007).drawn(1)

@@ -33,6 +33,7 @@ def parted(dataset: Dataset, share: float) -> Dataset:
     return dataset.replace(trials=(part(slice(0, cut), "fit"), part(slice(cut, None), "test")))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rig", "most", "farthest"), [("dfki_a0", 0.135, 0.08), ("dfki_c1", 0.105, 0.03)])
 def test_dry_friction_at_both_joints_of_motor_driven_arms(data: Path, rig: str, most: float, farthest: float) -> None:
     found = armrs.find_gap(data / rig, separate=False, threads=2)
@@ -52,6 +53,7 @@ def test_dry_friction_and_drag_of_a_pendulum_are_told_together_and_foretell_its_
     assert found.gap["q1_rad"].after < 0.010 < found.gap["q1_rad"].calibrated
 
 
+@pytest.mark.long
 def test_dry_friction_of_a_double_pendulum(data: Path) -> None:
     found = armrs.find_gap(data / "pendulum_double", separate=False, threads=2)
     assert any(kind in DRY for kind, _ in named(found))

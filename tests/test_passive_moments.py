@@ -51,6 +51,7 @@ def test_the_orthosis_counts(session: Dataset, result: passive.PassiveMoments) -
         assert shift > 0.3 if a.configuration.startswith("elbow") and a.joint == 1 else shift < 1e-12 or a.configuration.startswith("elbow")
 
 
+@pytest.mark.long
 def test_a_coupling_is_found_when_it_is_there_and_not_when_it_is_not() -> None:
     found, values = check_passive.coupled(1.5, 12)["both"]
     assert found >= 11 / 12 and abs(values.mean() - 1.5) < 0.3
@@ -76,6 +77,7 @@ def test_no_coupling_is_made_of_configurations_that_scatter_differently(held: tu
     assert found / 120 < 0.05 + 2.5 * np.sqrt(0.05 * 0.95 / 120)
 
 
+@pytest.mark.long
 def test_the_coupling_is_found_with_the_scatter_of_the_thesis_and_not_made_up() -> None:
     """Over trials as in tables 4.1 and 4.2; the script makes 600 runs of it."""
     runs = 120
@@ -84,6 +86,7 @@ def test_the_coupling_is_found_with_the_scatter_of_the_thesis_and_not_made_up() 
     assert check_passive.over_trials(0.0, runs) / runs < 0.05 + beyond_chance
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ratio", [0.0, 0.4])
 def test_ends_that_move_with_the_other_joint_are_told_at_both_joints(ratio: float) -> None:
     """With the tone of the thesis. The weight of an arm known to 5 % hides them in the shoulder alone."""

@@ -101,6 +101,7 @@ def test_a_plan_beats_the_movement_of_the_thesis_tenfold() -> None:
     assert thesis.worst > 10.0 * planned.worst
 
 
+@pytest.mark.long
 def test_what_is_planned_comes_out() -> None:
     """Second moments within 5 %, first moments within 2 %, and predictions of the right size; scripts/check_plan.py does it 200 times."""
     repetitions = 16
@@ -114,6 +115,7 @@ def test_what_is_planned_comes_out() -> None:
     assert planned.worst < 0.05
 
 
+@pytest.mark.long
 def test_a_wrist_that_hangs_between_forearm_and_handle_is_identified() -> None:
     """It moves by half a degree under noise of 0.1° and offsets of 0.3°: estimates are where the forecast says, whatever they start from."""
     arm = check_plan.truth(3)

@@ -16,6 +16,8 @@ from armrs import cli
 from armrs.thesis.people import TABLE_4_10
 from browser import OF_COLOURS, ONE_OF_A_KIND, WIDTHS, faults_on_paper, faults_on_screens, opened, violations
 
+pytestmark = pytest.mark.long
+
 NEEDED = {"3.5", "3.6", "3.7", "3.9", "3.10", "3.12", *(f"4.{k}" for k in range(1, 42))}
 """Tables and figures that some item has to be about."""
 

@@ -17,6 +17,8 @@ from armrs.io.plausibility import refuse_implausible
 from armrs.workflows.setup import examine_setup
 from gap_sessions import session as gap_session
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parents[1]
 SEEDS = {"MuJoCo, two segments": 65005, "MuJoCo, three segments": 65004}
 """Development seeds of `bench/hidden/mujoco_world`, little-known arms."""

@@ -107,6 +107,7 @@ def test_one_speed_is_refused() -> None:
         armrs.spasticity(one)
 
 
+@pytest.mark.long
 def test_a_plan_of_stretches_expects_what_patients_scatter_by() -> None:
     limits = Limits(((patients.LOW, patients.HIGH),), speed=4.0, acceleration=40.0)
     patient = Patient()
