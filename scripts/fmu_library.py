@@ -71,7 +71,7 @@ def of(target: str) -> tuple[str, str]:
 def foreign(target: str, name: str, portable: bool) -> Path:
     """Build for another machine, or for older systems."""
     work = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).absolute() / "crosscheck"
-    old = portable and "linux" in target
+    old = portable and target.endswith("linux-gnu")
     glibc = {"ARMRS_GLIBC": version(OLDEST)} if old else {}
     done = subprocess.run([str(ROOT / "scripts" / "foreign.sh"), target, str(work), "-p", "arm-fmu"], check=False, env=os.environ | glibc)
     if done.returncode:

@@ -3,6 +3,7 @@
 # add TARGET`), or is made from the distribution's source.
 #   scripts/foreign.sh TARGET WORK [cargo arguments]    the results are in WORK/foreign/TARGET/release
 # With ARMRS_GLIBC=2.17, for Linux, Zig's linker takes the place of the distribution's: the results, in WORK/portable, need no newer glibc.
+# For musl and macOS there is no other linker; their results are in WORK/foreign.
 # Exit status 77, and the last line names what to install, where something is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -19,6 +20,7 @@ i686-unknown-linux-gnu) linker=i686-linux-gnu-gcc packages="gcc-i686-linux-gnu l
 riscv64gc-unknown-linux-gnu) linker=riscv64-linux-gnu-gcc packages="gcc-riscv64-linux-gnu libc6-dev-riscv64-cross" ;;
 s390x-unknown-linux-gnu) linker=s390x-linux-gnu-gcc packages="gcc-s390x-linux-gnu libc6-dev-s390x-cross" ;;
 x86_64-pc-windows-gnu) linker=x86_64-w64-mingw32-gcc packages="gcc-mingw-w64-x86-64" ;;
+x86_64-unknown-linux-musl | aarch64-apple-darwin) linker=zig ;;
 *) skip "$target is not known here" ;;
 esac
 own=$(rustc --print target-libdir --target "$target" 2>/dev/null || true)
@@ -30,6 +32,11 @@ fi
 if [ -n "${ARMRS_GLIBC:-}" ]; then
   have cargo-zigbuild || skip "pip install ziglang cargo-zigbuild"
   build=(zigbuild --target "$target.$ARMRS_GLIBC" --target-dir "$work/portable") flags=
+elif [ "$linker" = zig ]; then
+  have cargo-zigbuild || skip "pip install ziglang cargo-zigbuild"
+  build=(zigbuild --target "$target" --target-dir "$work/foreign") flags=
+  # A shared library for musl needs its C library to be shared as well.
+  [ "${target##*-}" = musl ] && flags="-C target-feature=-crt-static"
 else
   have "$linker" || skip "Debian: $packages"
   build=(build --target "$target" --target-dir "$work/foreign") flags="-C linker=$linker"
