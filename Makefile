@@ -35,11 +35,11 @@ demo: build ## build, run the main job on built-in data, print where the report 
 
 # The halves side by side, since each leaves a core idle at times; not as jobs of one make, whose job server cargo and the tests
 # would inherit.
-test: $(STAMPS)/venv ## every check but test-long: formatting, lints, Rust and Python tests, types, examples
+test: $(STAMPS)/venv ## formatting, lints, types, Rust and Python tests but the long ones
 	@unset MAKEFLAGS MFLAGS MAKELEVEL; $(MAKE) rust & half=$$!; $(MAKE) python; other=$$?; wait $$half && exit $$other
 	@echo "make test: everything passed"
 
-test-long: $(STAMPS)/dev ## Python tests of some ten seconds each: the thesis computed again, measured rigs, statistics over many draws
+test-long: $(STAMPS)/dev ## the long Python tests: the thesis computed again, measured rigs, statistics over many draws
 	$(PYTEST) -m long
 
 build: $(STAMPS)/build ## compile the extension module and install it into .venv
