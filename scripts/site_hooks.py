@@ -23,6 +23,8 @@ ELSEWHERE = {
     "equations.md": "python/armrs/thesis/equations.md",
 }
 """Pages of the site by the files that they are made of, from the root of the repository."""
+UNSOUGHT = {*ELSEWHERE, "architecture.md", "developer.md", "dossier.md"}
+"""Pages that the search leaves out: a reader's browser loads its index with the first page, and these are not what is looked for."""
 _PROSE = re.compile(r"(<(?:p|ul|ol)\b.*?</(?:p|ul|ol)>)", flags=re.S)
 _NAMED_BLOCK = re.compile(r"^```(\w+) ([^\n\"=]+)$", flags=re.M)
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', flags=re.S)
@@ -44,8 +46,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     markdown = _NAMED_BLOCK.sub(r'```\1 title="\2"', markdown)
     for name, source in ELSEWHERE.items():
         markdown = markdown.replace(f"](../{source}", f"]({name}")
-    if page.file.src_uri in ("changelog.md", "contributing.md", "equations.md", "hidden-worlds.md", "speed-beside-others.md"):
-        # A reader's browser loads the index with the first page; these are not what is looked for.
+    if page.file.src_uri in UNSOUGHT:
         page.meta["search"] = {"exclude": True}
     if page.file.src_uri in ELSEWHERE:
         # Written from the root of the repository, or from two folders below it.
