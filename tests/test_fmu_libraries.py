@@ -10,6 +10,7 @@ import pytest
 from armrs import __version__, cli
 from armrs.cosim.library import platform_folder
 from armrs.errors import BadInput
+from armrs.fmu import libraries
 from armrs.fmu.export import export_fmu
 from armrs.fmu.libraries import PLATFORMS, Platform
 from armrs.workflows.demo import true_model
@@ -82,6 +83,18 @@ def test_a_library_for_another_machine_is_refused(name: str, folder: Path, tmp_p
     assert not (tmp_path / "arm.fmu").exists()
 
 
+def test_a_package_with_the_library_of_another_machine_is_refused(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wheel for aarch64 that held the library for x86-64 wrote it into the folder for aarch64."""
+    here = platform_folder(3)[0]
+    if here not in PLATFORMS:
+        pytest.skip(f"no folder {here}")
+    other = MACHINES[MACHINES.index(here) - 1]
+    monkeypatch.setattr(libraries, "library", lambda: folder / other / PLATFORMS[other].file)
+    with pytest.raises(BadInput, match=f"a file for another machine, allowed a library for {here}"):
+        export_fmu(true_model(), tmp_path / "arm.fmu")
+    assert not (tmp_path / "arm.fmu").exists()
+
+
 def test_a_library_of_another_version_is_refused(folder: Path, tmp_path: Path) -> None:
     path = folder / "x86_64-windows" / "arm_fmu.dll"
     for content, words in (
@@ -110,7 +123,8 @@ def test_a_folder_without_libraries_is_refused(folder: Path, tmp_path: Path) -> 
             export_fmu(true_model(), tmp_path / "arm.fmu", libraries=place)
 
 
-def test_fmi_2_is_refused_on_a_machine_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fmi_2_is_refused_on_a_machine_without_a_folder(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(libraries, "library", lambda: folder / "aarch64-linux" / "libarm_fmu.so")
     monkeypatch.setattr("platform.machine", lambda: "aarch64")
     monkeypatch.setattr("sys.platform", "linux")
     with pytest.raises(BadInput, match=r"FMI 2\.0 has no folder for libraries of aarch64-linux"):

@@ -88,13 +88,14 @@ def collected(fmi: int, folder: str | os.PathLike[str] | None) -> tuple[dict[tup
     Raises
     ------
     BadInput
-        For a folder without libraries, or a file that is none of this version for the machine that its folder names.
+        For a folder without libraries, or a file that is none of this version for the machine that its folder names; for that of the
+        package too, which a wheel that was made on another machine may have got wrong.
     """
     given = {} if folder is None else _read(checks.path("library", folder))
     licence = None if folder is None else Path(folder) / LICENCE
     here, suffix = platform_folder(3)
     if here not in given:
-        given[here] = library().read_bytes()
+        given[here] = _checked(library(), here) if here in PLATFORMS else library().read_bytes()
     if licence is None or not licence.is_file():
         licence = library().with_name(LICENCE)
     found, left_out = {}, []
@@ -123,20 +124,21 @@ def _read(folder: Path) -> dict[str, bytes]:
         path = entry / PLATFORMS[entry.name].file
         if not path.is_file():
             raise BadInput("library", Text("nothing"), f"{entry.name}/{path.name}", file=folder)
-        found[entry.name] = _checked(path, PLATFORMS[entry.name])
+        found[entry.name] = _checked(path, entry.name)
     if not found:
         raise BadInput("library", Text("no libraries"), "x86_64-linux/libarm_fmu.so or others beside", file=folder)
     return found
 
 
-def _checked(path: Path, platform: Platform) -> bytes:
+def _checked(path: Path, name: str) -> bytes:
+    platform = PLATFORMS[name]
     if path.stat().st_size > _MOST_BYTES:
         raise BadInput("library", Text(f"{path.stat().st_size} bytes"), f"at most {_MOST_BYTES}", file=path)
     content = path.read_bytes()
     # A program of Windows begins with one of DOS, which says where the other is.
     at = int.from_bytes(content[60:64], "little") + 4 if platform.magic == b"MZ" else 4 if platform.magic == _MACH else 18
     if not content.startswith(platform.magic) or content[at : at + len(platform.machine)] != platform.machine:
-        raise BadInput("library", Text("a file for another machine"), f"a library for {path.parent.name}", file=path)
+        raise BadInput("library", Text("a file for another machine"), f"a library for {name}", file=path)
     if _MARK + _armrs.__version__.encode() + b"\0" not in content:
         start = content.find(_MARK)
         version = content[start + len(_MARK) : start + 60].split(b"\0")[0].decode(errors="replace") if start >= 0 else "no library of armrs"
