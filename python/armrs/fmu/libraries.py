@@ -93,14 +93,14 @@ def collected(fmi: int, folder: str | os.PathLike[str] | None) -> tuple[dict[tup
     """
     given = {} if folder is None else _read(checks.path("library", folder))
     licence = None if folder is None else Path(folder) / LICENCE
-    here, suffix = platform_folder(3)
+    here = platform_folder(3)[0]
     if here not in given:
-        given[here] = _checked(library(), here) if here in PLATFORMS else library().read_bytes()
+        given[here] = _checked(library(), here)
     if licence is None or not licence.is_file():
         licence = library().with_name(LICENCE)
     found, left_out = {}, []
     for name, content in given.items():
-        known = PLATFORMS.get(name, Platform(_OTHERS_OF_2.get(name), "", suffix, b"", b""))
+        known = _platform(name)
         place = name if fmi == 3 else known.folder_of_2
         if place is None:
             left_out.append(name)
@@ -109,6 +109,11 @@ def collected(fmi: int, folder: str | os.PathLike[str] | None) -> tuple[dict[tup
     if not found:
         raise BadInput("fmi", fmi, f"3: FMI 2.0 has no folder for libraries of {', '.join(left_out)}")
     return dict(sorted(found.items())), licence.read_bytes(), left_out
+
+
+def _platform(name: str) -> Platform:
+    """Return a kind of machine; of one for which only the package was built, nothing tells its files."""
+    return PLATFORMS.get(name, Platform(_OTHERS_OF_2.get(name), "", platform_folder(3)[1], b"", b""))
 
 
 def _read(folder: Path) -> dict[str, bytes]:
@@ -131,7 +136,7 @@ def _read(folder: Path) -> dict[str, bytes]:
 
 
 def _checked(path: Path, name: str) -> bytes:
-    platform = PLATFORMS[name]
+    platform = _platform(name)
     if path.stat().st_size > _MOST_BYTES:
         raise BadInput("library", Text(f"{path.stat().st_size} bytes"), f"at most {_MOST_BYTES}", file=path)
     content = path.read_bytes()
