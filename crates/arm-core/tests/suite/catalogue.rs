@@ -14,7 +14,7 @@ const NAMES: &str = "viscous coulomb stribeck load_friction quadratic_drag angle
     backlash contact_compliance contact_damping robot_ripple force_bias force_drift force_gain \
     force_misalignment angle_offset time_delay handle_slip";
 
-fn rig(random: &mut Random) -> Setup<f64, 3> {
+pub fn rig(random: &mut Random) -> Setup<f64, 3> {
     let contact = Contact {
         stiffness: [9000.0, 10000.0],
         damping: [25.0, 30.0],
@@ -23,7 +23,7 @@ fn rig(random: &mut Random) -> Setup<f64, 3> {
     Setup::new(&random.arm::<3>(), contact)
 }
 
-fn reading(random: &mut Random) -> Reading<f64, 3> {
+pub fn reading(random: &mut Random) -> Reading<f64, 3> {
     Reading {
         time: random.uniform(0.1, 3.0),
         q: random.joints(2.0),
@@ -33,7 +33,7 @@ fn reading(random: &mut Random) -> Reading<f64, 3> {
 }
 
 /// Torques that a motion needs with an effect in force, by whatever way it acts.
-fn needed(
+pub fn needed(
     effect: &Effect<f64>,
     rig: &Setup<f64, 3>,
     motion: &Motion<f64, 3>,

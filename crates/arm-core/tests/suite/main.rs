@@ -8,6 +8,7 @@ mod catalogue;
 mod chain;
 mod common;
 mod contact;
+mod declared;
 mod dual;
 mod effects;
 mod faults;
