@@ -18,7 +18,7 @@ PLAN = ["--angles-deg=-80:-20,30:90"]
 TAKEN = {
     "gap-report.png": "demo/gap/figures/summary.png",
     "gap-before-and-after.png": "demo/gap/figures/before-and-after.png",
-    "gap-effect.png": "demo/gap/figures/effect-1-coulomb-in-joint-2.png",
+    "gap-effect.png": "demo/gap/figures/effect-1-coulomb-friction-in-joint-2.png",
     "identified-parameters.png": "demo/identified/figures/parameters.png",
     "identified-torques.png": "demo/identified/figures/torques-between.png",
     "passive-moments.png": "demo/passive/figures/passive-between.png",

@@ -90,14 +90,16 @@ def test_the_search_finds_the_brakes_and_closes_the_gap(folder: Path, result: di
     for name in ("Fy_N", "Fz_N"):
         channel = gap["gap"][name]
         assert channel["after"] < 1.1 * channel["floor"] < 0.6 * channel["calibrated"]
-    assert result["verdict"].startswith("The search found both brakes (0.139 and 0.161 N m were hidden): the model lacks ")
+    assert result["verdict"].startswith(
+        "The search found both brakes (0.139 and 0.161 N m were hidden): missing from the model are Coulomb friction in joint 1 (shoulder), torque "
+    )
     assert "coulomb = 0.0" in (folder / "session/model.toml").read_text(encoding="utf-8")
 
 
 def test_the_slow_movements_alone_cannot_tell_dry_friction_from_viscosity(result: dict) -> None:
     (shoulder,) = (line for line in result["slow_alone"]["lines"] if "joint 1 (shoulder)" in line)
     assert "cannot be told from" in shoulder
-    assert "viscous" in shoulder and "coulomb" in shoulder
+    assert "viscous damping" in shoulder and "Coulomb friction" in shoulder
 
 
 def test_a_converted_data_set_is_still_synthetic(folder: Path, tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
         written[-1],
         figures=5,
         headings={
-            "What the model lacks",
+            "Missing from the model",
             "Each effect by itself",
             "The gap on trials that were kept apart",
             "Where model and data disagree",
@@ -63,7 +63,7 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
             "How to repeat",
         },
     )
-    assert verdict.startswith("The model lacks viscous in joint 2 (elbow), viscosity 0.4022 ± 0.0071 N m s/rad: with it, the gap")
+    assert verdict.startswith("Missing from the model is viscous damping in joint 2 (elbow), viscosity 0.402 N m s/rad (95 %: ")
     assert verdict.count(". ") == 0 and "on held-out trials falls from" in verdict
     assert unescaped(tmp_path / "gap.json", tmp_path) == []
 

@@ -18,8 +18,12 @@ def channel(before: float, calibrated: float, after: float, floor: float | None)
     return {"before": before, "calibrated": calibrated, "after": after, "floor": floor}
 
 
+def sized(value: float, std: float, unit: str) -> dict[str, Any]:
+    return {"value": value, "std": std, "unit": unit, "interval": [value - 2.0 * std, value + 2.0 * std]}
+
+
 def effect(kind: str, joint: int | None = None, size: tuple[str, float, float, str] | None = None, **more: Any) -> dict[str, Any]:
-    parameters = {} if size is None else {size[0]: {"value": size[1], "std": size[2], "unit": size[3]}}
+    parameters = {} if size is None else {size[0]: sized(*size[1:])}
     return {"kind": kind, "joint": joint, "channel": None, "parameters": parameters, "alternatives": [], **more}
 
 
@@ -41,8 +45,8 @@ DRY = effect("coulomb", 2, ("torque", 0.161, 0.006, "N m"))
 
 def test_a_named_effect_is_told_with_its_size_and_what_it_is_worth() -> None:
     assert headline(result("explained", DRY)) == (
-        "The model lacks coulomb in joint 2 (elbow), torque 0.1610 ± 0.0060 N m: with it, the gap of the contact force upward (Fz) on held-out trials falls from 2.4 to "
-        "0.16 N, where repeats differ by 0.15 N."
+        "Missing from the model is Coulomb friction in joint 2 (elbow), torque 0.161 N m (95 %: 0.149 to 0.173): with it, the gap of the "
+        "contact force upward (Fz) on held-out trials falls from 2.4 N to 0.16 N, where repeats differ by 0.15 N."
     )
 
 
@@ -58,9 +62,11 @@ def test_of_two_amplitudes_the_larger_one_is_told() -> None:
             ("phase", 0.7, None, "rad"),
         )
     }
-    assert headline(result("explained", heave)).startswith("The model lacks shoulder heave, z -0.00300 ± 0.00010 m: with it, ")
+    assert headline(result("explained", heave)).startswith(
+        "Missing from the model is shoulder heave, z -0.0030 m (95 %: -0.0032 to -0.0028): with it, "
+    )
     heave |= {"summary": "first joint that heaves", "formula": "f", "p_value": 1e-20}
-    assert "z -0.00300 m (95 %: -0.00320 to -0.00280)" in named(result("explained", heave))[0]
+    assert "z -0.0030 m (95 %: -0.0032 to -0.0028)" in named(result("explained", heave))[0]
 
 
 def test_an_open_gap_contradicts_no_sentence() -> None:
@@ -71,7 +77,7 @@ def test_an_open_gap_contradicts_no_sentence() -> None:
         assert still_open(told) == ["q3_rad", "Fz_N"]
         said = headline(told)
         assert "Nothing is missing" not in said and "falls from" not in said
-        assert "off by 0.015 rad, where repeats differ by 0.0019 rad" in said
+        assert "off by 0.88°, where repeats differ by 0.11°" in said
         assert [row[-1] for row in gap(told).rows] == ["open", "open"]
         assert any("the angle of joint 3 (q3) is open on the test trials" in line for line in left(told))
 
@@ -79,29 +85,32 @@ def test_an_open_gap_contradicts_no_sentence() -> None:
 def test_the_sketch_says_where_a_rival_acts_that_acts_elsewhere() -> None:
     at = [SimpleNamespace(kind="elastic", joint=joint, channel=None) for joint in (2, 1)]
     torn: Any = SimpleNamespace(joint=2, channel=None, alternatives=at)
-    assert rivals(torn) == ["elastic", "elastic in joint 1"]
+    assert rivals(torn) == ["elastic spring", "elastic spring in joint 1"]
 
 
 def test_names_that_leave_the_gap_open_are_what_comes_nearest() -> None:
     """As where a slack tendon was called a spring over two joints: it closed 0.41 of the gap of the force."""
-    told = result("unexplained", DRY, gap={"Fz_N": channel(2.6, 2.31, 1.41, 0.1)})
+    # Under this verdict no effect has an interval.
+    bare = {**DRY, "parameters": {"torque": DRY["parameters"]["torque"] | {"std": None, "interval": None}}}
+    told = result("unexplained", bare, gap={"Fz_N": channel(2.6, 2.31, 1.41, 0.1)})
     assert headline(told) == (
-        "Something is missing that the catalogue has no name for; nearest to it is coulomb in joint 2 (elbow), torque 0.1610 ± 0.0060 N m, which "
-        "does not close the gap: on held-out trials the contact force upward (Fz) is still off by 1.4 N, where repeats differ by 0.1 N."
+        "Something is missing that no effect of the catalogue explains; nearest to it is Coulomb friction in joint 2 (elbow), which does not "
+        "close the gap: on held-out trials the contact force upward (Fz) is still off by 1.4 N, where repeats differ by 0.1 N."
     )
     assert heading(told) == "What comes nearest to what is missing"
     # Nine tenths of the gap closed, or a gap that hardly was there: the names stand.
     for before, after, verdict in ((2.31, 0.3, "unexplained"), (0.105, 0.3, "unexplained"), (2.31, 1.41, "explained")):
         told = result(verdict, DRY, gap={"Fz_N": channel(2.6, before, after, 0.1)})
-        assert headline(told).startswith("The model lacks coulomb in joint 2") and heading(told) == "What the model lacks"
+        assert headline(told).startswith("Missing from the model is Coulomb friction in joint 2")
+        assert heading(told) == "Missing from the model"
 
 
 def test_what_the_result_calls_open_counts_with_its_place() -> None:
     listed = [{"channel": "q3_rad", "trial": "trials/fast_2.csv", "t_start": 3.14, "t_end": 4.6}]
     told = result("unexplained", DRY, open=listed)
     assert still_open(told) == ["q3_rad"]
-    assert headline(told).endswith("(q3) is still off by 0.0019 rad, where repeats differ by 0.0018 rad (trials/fast_2.csv, 3.1 to 4.6 s).")
-    assert "and something that the catalogue has no name for" in headline(told)
+    assert headline(told).endswith("(q3) is still off by 0.11°, where repeats differ by 0.1° (trials/fast_2.csv, 3.1 to 4.6 s).")
+    assert "and something that no effect of the catalogue explains" in headline(told)
     # What it calls closed is closed, whatever the ratio: its test knows what the floor is uncertain by.
     assert still_open(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.3, 0.15)}, open=[])) == []
 
@@ -117,20 +126,22 @@ def test_a_joint_that_friction_holds_is_no_riddle() -> None:
     )
     # A force is open beside it, or nothing holds the joint.
     for seen, opened in ((hidden, [q3, q3 | {"channel": "Fz_N"}]), ([], [q3])):
-        assert "no name for" in headline(result("unexplained", DRY, open=opened, would_have_seen=seen))
+        assert "no effect of the catalogue explains" in headline(result("unexplained", DRY, open=opened, would_have_seen=seen))
 
 
 def test_what_is_not_decided_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
     rival = {"kind": "viscous", "joint": 1, "channel": None}
     torn = effect("coulomb", 1, ("torque", 0.14, 0.01, "N m"), decided=False, family="dry", alternatives=[rival])
     assert headline(result("explained", torn)).startswith(
-        "The model lacks coulomb or viscous in joint 1 (shoulder), which these movements cannot tell apart: with it, "
+        "Missing from the model is Coulomb friction or viscous damping in joint 1 (shoulder), which these movements cannot tell apart: with it, "
     )
     monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
     one_family = headline(result("explained", {**torn, "alternatives": [{**rival, "kind": "stribeck"}]}))
-    assert one_family.startswith("The model lacks dry friction in joint 1 (shoulder) (coulomb or stribeck: not told apart): with it, ")
+    assert one_family.startswith(
+        "Missing from the model is dry friction in joint 1 (shoulder) (Coulomb friction or Stribeck friction: not told apart): with it, "
+    )
     elsewhere = {**torn, "alternatives": [{**rival, "joint": 2}]}
-    assert "coulomb in joint 1 (shoulder) or viscous in joint 2 (elbow), which" in headline(result("explained", elsewhere))
+    assert "Coulomb friction in joint 1 (shoulder) or viscous damping in joint 2 (elbow), which" in headline(result("explained", elsewhere))
 
 
 def test_a_trial_stands_beside_what_is_not_decided_in_it() -> None:
@@ -138,31 +149,33 @@ def test_a_trial_stands_beside_what_is_not_decided_in_it() -> None:
     slip = {**effect("handle_slip", None, ("y", 2e-3, 1e-4, "m")), "decided": False, "trial": "trials/a_3.csv", "alternatives": [rival]}
     said = headline(result("explained", slip))
     assert said.startswith(
-        "The model lacks handle slip or angle offset in joint 1 (shoulder) in trials/a_3.csv only, which these movements cannot tell apart: "
+        "Missing from the model is handle slip or angle offset in joint 1 (shoulder) in trials/a_3.csv only, which these movements cannot tell apart: "
     )
 
 
 def test_many_effects_are_named_by_kind(monkeypatch: pytest.MonkeyPatch) -> None:
     springs = [effect("elastic", j, ("stiffness", 1.0, 0.1, "N m/rad")) for j in (3, 1, 2)]
     said = headline(result("explained", *springs, DRY))
-    assert said.startswith("The model lacks 4 effects (elastic in joints 1, 2 and 3; coulomb in joint 2): with them, ")
+    assert said.startswith(
+        "Missing from the model are 4 effects (elastic spring in joints 1, 2 and 3; Coulomb friction in joint 2): with them, "
+    )
     monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
     torn = {**DRY, "decided": False, "alternatives": [{"kind": "stribeck", "joint": 2, "channel": None}]}
     said = headline(result("explained", *springs, torn))
-    assert "joints 1, 2 and 3; dry friction in joint 2 (coulomb or stribeck: not told apart)): with them, " in said
+    assert "joints 1, 2 and 3; dry friction in joint 2 (Coulomb friction or Stribeck friction: not told apart)): with them, " in said
 
 
 def test_nothing_is_claimed_that_was_not_tested() -> None:
-    assert headline(result("nothing_missing")).startswith("Nothing is missing: on held-out trials")
+    assert headline(result("nothing_missing")).startswith("Nothing is missing that these data could show: on held-out trials")
     near, wider = ({"q2_rad": channel(0.003, last, last, 1e-3)} for last in (1.08e-3, 1.21e-3))
-    assert headline(result("nothing_missing", gap=near)).endswith("every channel is off by what repeats differ by.")
-    assert headline(result("nothing_missing", gap=wider)).endswith("every channel is off by at most 1.3 times what repeats differ by.")
+    assert headline(result("nothing_missing", gap=near)).endswith("no channel is off by more than about what repeats differ by.")
+    assert headline(result("nothing_missing", gap=wider)).endswith("no channel is off by more than 1.3 times what repeats differ by.")
     assert "cannot be tested" in headline(result("nothing_missing", z=None))
     untested = {"q2_rad": dict.fromkeys(("before", "calibrated", "after", "floor"))}
     for kept in ({}, untested):
         assert headline(result("explained", DRY, gap=kept)).endswith("; there is no test trial to measure the gap on.")
         assert "held-out" not in headline(result("nothing_missing", gap=kept))
-    assert headline(result("unexplained")).startswith("Something is missing that the catalogue has no name for: on held-out trials")
+    assert headline(result("unexplained")).startswith("Something is missing that no effect of the catalogue explains: on held-out trials")
 
 
 @pytest.mark.parametrize(
@@ -234,7 +247,7 @@ def test_what_has_no_interval_has_no_columns_for_it() -> None:
     assert list(table.head) == ["effect", "at", "share", "parameter", "value", "unit"]
     assert list(table.rows[0]) == ["coulomb", 2, "50%", "torque", "0.161", "N m"]
     assert intervals(result("unexplained", bare)).startswith("No intervals are given")
-    sized = {**DRY, "share": 0.5, "parameters": {"torque": {**DRY["parameters"]["torque"], "interval": [0.149, 0.173]}}}
+    sized = {**DRY, "share": 0.5, "parameters": DRY["parameters"]}
     assert "95 % interval" in missing(result("explained", sized)).head
     assert intervals(result("explained", sized)) == "An interval holds if the structure of the model is right."
 
@@ -247,7 +260,11 @@ def test_effects_stand_joint_by_joint_as_on_the_page_for_a_clinician() -> None:
         one["parameters"]["torque"]["interval"] = [0.149, 0.173]
     told = result("explained", *listed)
     assert [row[1] for row in missing(told).rows] == [1, 2, None]
-    assert [line.split(":")[0] for line in named(told)] == ["coulomb in joint 1 (shoulder)", "coulomb in joint 2 (elbow)", "coulomb"]
+    assert [line.split(":")[0] for line in named(told)] == [
+        "Coulomb friction in joint 1 (shoulder)",
+        "Coulomb friction in joint 2 (elbow)",
+        "Coulomb friction",
+    ]
 
 
 def test_an_effect_with_two_sizes_came_nearest_once() -> None:
@@ -261,12 +278,12 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     """It was called a misfit, as was what is left in units of the floor."""
     rival = effect("viscous", 2, why="explains these movements nearly as well", worse=7.1)
     assert others(result("explained", {**DRY, "alternatives": [rival]})) == [
-        "Instead of coulomb in joint 2 it may be viscous in joint 2 (explains these movements nearly as well, by 7.1 units less)."
+        "Instead of Coulomb friction in joint 2 it may be viscous damping in joint 2 (explains these movements nearly as well, by 7.1 units less)."
     ]
     far = effect("viscous", 2, why="explains these movements as far as a law that is not exact can", worse=170.4)
     [line] = others(result("explained", {**DRY, "alternatives": [far]}))
     assert line.endswith(
-        "it may be viscous in joint 2 (explains these movements as far as a law that is not exact can, by 170 units less)."
+        "it may be viscous damping in joint 2 (explains these movements as far as a law that is not exact can, by 170 units less)."
     )
     # What is 13 standard deviations apart already cannot be told apart only because a law may miss as much.
     asked = {"separating_movement": "lead the elbow alone", "separation": {"now": 13.0, "then": 40.0}}

@@ -276,12 +276,12 @@ def test_effects_are_switched_on_and_off(pages: Path) -> None:
     with opened(pages / "gap" / "report.html") as seen:
         names = seen.page.evaluate("[...document.querySelectorAll('.series input')].map(i => i.value)")
         assert {"measured", "with the named effects"} < set(names)
-        assert any(name.startswith("without coulomb in joint 2") for name in names)
+        assert any(name.startswith("without Coulomb friction in joint 2") for name in names)
         data = json.loads(seen.page.locator(".series script").text_content())
         force = next(panel for panel in data["panels"] if panel["title"] == "Fy")
         measured, full, without = (
             np.array(next(line["values"] for line in force["lines"] if line["name"].startswith(start)), dtype=float)
-            for start in ("measured", "with the named", "without coulomb in joint 2")
+            for start in ("measured", "with the named", "without Coulomb friction in joint 2")
         )
         known = np.isfinite(measured)
         assert np.std((full - measured)[known]) < 0.5 * np.std((without - measured)[known])

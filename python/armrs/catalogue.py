@@ -56,9 +56,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of effect: name, where it acts, what it does, its formula and its source."""
+    """One kind of effect: name, what it is called in a sentence, where it acts, what it does, its formula and its source."""
 
     kind: str
+    title: str
     where: str
     summary: str
     formula: str
@@ -98,6 +99,16 @@ def catalogue() -> Mapping[str, Kind]:
     except (ImportError, AttributeError):
         return MappingProxyType({})
     return MappingProxyType({entry["kind"]: _kind(entry) for entry in entries})
+
+
+def title(kind: str) -> str:
+    """Return what a kind is called in a sentence.
+
+    >>> title("coulomb"), title("contact_damping")
+    ('Coulomb friction', 'contact damping')
+    """
+    known = catalogue().get(kind)
+    return known.title if known else kind.replace("_", " ")
 
 
 def _kind(entry: Mapping[str, Any]) -> Kind:

@@ -13,7 +13,7 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     )
 }
 
-/// All kinds of effects, those of one's own last: name, where, parameters with units and bounds, formula, reference.
+/// All kinds of effects, those of one's own last: name, title, where, parameters with units and bounds, formula, reference.
 #[pyfunction]
 pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
@@ -33,6 +33,11 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         }
         let entry = PyDict::new(py);
         entry.set_item("kind", info.kind)?;
+        let title = kind.title().map(str::to_string);
+        entry.set_item(
+            "title",
+            title.unwrap_or_else(|| info.kind.replace('_', " ")),
+        )?;
         entry.set_item("where", info.place.name())?;
         entry.set_item("summary", info.summary)?;
         entry.set_item("formula", info.formula)?;

@@ -49,7 +49,7 @@ def spasticity_figures(result: Spasticity) -> Figures:
 def _reflex(found: JointReflex, name: str) -> tuple[int, str]:
     """Return the number of a joint, and what was found of its reflex."""
     if not found.reflex.found:
-        return found.joint, f"{name}: no stretch reflex was found"
+        return found.joint, f"{name}: no stretch reflex was detected"
     return found.joint, f"{name}: stretch reflex from {np.degrees(found.reflex.parameters['threshold'].value):.3g} °/s on"
 
 

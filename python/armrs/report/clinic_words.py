@@ -29,15 +29,22 @@ def _spasticity(result: Mapping[str, Any]) -> str:
     for effect in result["effects"]:
         name, p = joints[effect["joint"] - 1], effect["parameters"]
         if not effect["decided"]:
-            said.append(f"{name}: no stretch reflex was found.")
+            said.append(f"{name}: no stretch reflex was detected in these stretches.")
             continue
-        parts = [f"{tables.number(p[k]['value'] * f, p[k]['std'] * f)} ± {tables.spread(p[k]['std'] * f)} {u}" for k, f, u in _SHOWN]
+        from_on, gain, latency = (_between(p[key], factor, held_in) for key, factor, held_in in _SHOWN)
         way = "growing" if p["direction"]["value"] > 0 else "falling"
-        said.append(f"{name}: a reflex resists stretch with {way} angle from {parts[0]}, with {parts[1]} beyond, {parts[2]} late.")
+        said.append(f"{name}: a reflex resists stretch with {way} angle above {from_on}; gain {gain}; latency {latency}.")
     return " ".join(said)
 
 
 _SHOWN = (("threshold", 180.0 / math.pi, "°/s"), ("gain", 1.0, "N m s/rad"), ("latency", 1000.0, "ms"))
+
+
+def _between(value: Mapping[str, Any], factor: float, held_in: str) -> str:
+    """Return a value in the unit that is `1 / factor` of its own, with its interval."""
+    std = factor * value["std"]
+    shown, low, high = (tables.number(factor * x, std) for x in (value["value"], *value["interval"]))
+    return f"{shown} {held_in} (95 %: {low} to {high})"
 
 
 def reflexes(result: Mapping[str, Any]) -> Table:
@@ -86,7 +93,7 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 def _cohort(result: Mapping[str, Any]) -> str:
     differ = [c for c in result["contrasts"] if c["p_value"] is not None and c["p_value"] < 0.05]
     named = "; ".join(f"{c['name']} differs between {c['between'][0]} and {c['between'][1]}" for c in differ)
-    named = named[:1].upper() + named[1:] or "No difference between groups or sides is significant"
+    named = named[:1].upper() + named[1:] or "No difference between groups or sides was detected"
     compared = f" {named}, at a level of 5 % over all of them together." if result["contrasts"] else ""
     count = len({q["name"] for q in result["quantities"]})
     return f"{result['subjects']} subjects, {result['sessions']} sessions, {count} {'quantity' if count == 1 else 'quantities'}.{compared}"
@@ -105,7 +112,18 @@ def quantities(result: Mapping[str, Any]) -> Table:
             for name, std in zip(("norm_low_interval", "norm_high_interval"), known, strict=True)
         ]
         rows.append([q["name"], q["group"], q["unit"], q["subjects"], mean, between, within, f"{low} … {high}", *ends])
-    head = ["quantity", "group", "unit", "n", "mean", "between", "within", "norm band", "its lower end", "its upper end"]
+    head = [
+        "quantity",
+        "group",
+        "unit",
+        "n",
+        "mean ± standard error",
+        "std between",
+        "std within",
+        "norm band",
+        "its lower end",
+        "its upper end",
+    ]
     return Table(head, rows, left=3)
 
 
@@ -122,7 +140,7 @@ def contrasts(result: Mapping[str, Any]) -> Table:
         ]
         for c in result["contrasts"]
     ]
-    return Table(["quantity", "difference", "unit", "estimate", "95 % interval", "p (Holm)"], rows, left=3)
+    return Table(["quantity", "difference", "unit", "estimate ± standard error", "95 % interval", "p (Holm)"], rows, left=3)
 
 
 def show_cohort(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:

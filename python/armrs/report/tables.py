@@ -396,7 +396,7 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
         last = f"{c['values'][-1]:.4g} ± {c['stds'][-1]:.2g}"
         rows.append([course_label(c), c["unit"], len(c["dates"]), last, *cells[0], *cells[1]])
     columns = ["since the session before", "p (Holm)", "changed", "since all before", "p (Holm)", "changed"]
-    head = ["parameter", "unit", "sessions", "last", *columns]
+    head = ["parameter", "unit", "sessions", "last ± std", *columns]
     # The session before is all before the second one.
     shown = {0: 4, 1: 4, 2: 7}.get(max((len(c["dates"]) for c in courses), default=0), len(head))
     return Table(head[:shown], [row[:shown] for row in rows], left=2, symbols=True)

@@ -292,8 +292,8 @@ def couplings(result: Mapping[str, Any]) -> list[str]:
     """Say for each pair of joints whether their elastic moments depend on one another."""
     found = result.get("couplings", ())
     lines = [
-        f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: {c['value_Nm_rad']:.3g} ± "
-        f"{c['std_Nm_rad']:.2g} N m/rad from both (p = {c['p_value']:.2g})"
+        f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: {c['value_Nm_rad']:.3g} N m/rad "
+        f"from both, standard deviation {c['std_Nm_rad']:.2g} N m/rad (p = {c['p_value']:.2g})"
         for c in found
     ]
     lines += [WRONG_MASS] * any(c["coupled"] for c in found)

@@ -17,6 +17,7 @@ import numpy as np
 
 from .._armrs import Readings
 from ..analysis.quantities import value_in
+from ..catalogue import title
 from ..io import files
 from ..io.dataset import Dataset, load_dataset, write_dataset
 from ..io.trial import Trial
@@ -331,7 +332,7 @@ def search_verdict(gap: GapFound) -> str:
     said = headline(gap_data(gap))
     hidden = {("coulomb", joint) for joint in range(1, len(BRAKES) + 1)}
     if {(e.kind, e.joint) for e in gap.effects} != hidden or len(gap.effects) != len(hidden):
-        return f"The search did not name what was hidden, dry friction (coulomb) in both joints: {said[0].lower()}{said[1:]}"
+        return f"The search did not name what was hidden, Coulomb friction in both joints: {said[0].lower()}{said[1:]}"
     brakes = joined([f"{torque:.3f}" for torque in BRAKES])
     return f"The search found both brakes ({brakes} N m were hidden): {said[0].lower()}{said[1:]}"
 
@@ -343,7 +344,7 @@ def of_slow_movements(slow: GapFound) -> list[str]:
         rivals = dict.fromkeys(a["kind"] for a in effect["alternatives"] if a["joint"] == effect["joint"])
         name = effect_name(effect, [j.name for j in slow.dataset.model.joints])
         if rivals:
-            lines.append(f"{name}: cannot be told from {joined([kind.replace('_', ' ') for kind in rivals], 'or')} by these movements")
+            lines.append(f"{name}: cannot be told from {joined([title(kind) for kind in rivals], 'or')} by these movements")
         else:
             lines.append(f"{name}: no other effect explains them as well")
     return lines

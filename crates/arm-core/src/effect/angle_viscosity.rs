@@ -21,6 +21,7 @@ impl Law for AngleViscosity {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("angle-dependent viscosity");
     const PRIOR: Prior = Prior::NONE.in_family(Family::Rate);
 
     #[inline]

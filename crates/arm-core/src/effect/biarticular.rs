@@ -28,6 +28,7 @@ impl Law for Biarticular {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("biarticular spring");
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[1.0, 0.5]))])
         .resting(2)

@@ -29,6 +29,7 @@ impl Law for BiarticularEndRange {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("biarticular end-range moment");
     const PRIOR: Prior = Prior::NONE.in_family(Family::TwoJoints);
     const CROSSES: bool = true;
 

@@ -21,6 +21,7 @@ impl Law for Coulomb {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("Coulomb friction");
     const SMOOTHED_BY: Option<usize> = Some(1);
     const RATE_INDEPENDENT: bool = true;
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])])

@@ -18,6 +18,7 @@ impl Law for CubicElastic {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("cubic spring");
     const PRIOR: Prior =
         Prior::lasting(&[Part::of(&[0]).shaped(&[(1, Values::Middle)]).varying(&[1])])
             .missing(0.002)

@@ -18,6 +18,7 @@ impl Law for Elastic {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("elastic spring");
     const PRIOR: Prior =
         Prior::lasting(&[Part::of(&[0]).shaped(&[(1, Values::Middle)]).resting(1)])
             .typically(1.0)

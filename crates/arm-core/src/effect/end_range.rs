@@ -23,6 +23,7 @@ impl Law for EndRange {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("end-range moment");
     const PRIOR: Prior = Prior::lasting(&[
         Part::of(&[0])
             .shaped(&[(2, Values::Each(&[5.0, 8.0, 12.0])), (3, Values::Highest)])

@@ -18,6 +18,7 @@ impl Law for GravityMoment {
         parameters: &[Parameter::linear("moment", "kg m", -5.0, 5.0, 0.0)],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("change of gravity moment");
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(2e-3)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, index: usize, setup: &mut Setup<T, N>) {

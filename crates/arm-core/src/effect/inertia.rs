@@ -15,6 +15,7 @@ impl Law for Inertia {
         parameters: &[Parameter::linear("change", "kg m²", -1.0, 10.0, 0.0)],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("change of inertia");
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(1e-3)]);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, index: usize, setup: &mut Setup<T, N>) {

@@ -178,6 +178,8 @@ pub trait Law {
     const FEELS_FORCE: bool = false;
     /// Whether it looks at [`Local::activity`].
     const FEELS_ACTIVITY: bool = false;
+    /// What it is called in a sentence, where that is not its kind with spaces.
+    const TITLE: Option<&'static str> = None;
     /// What it acts on.
     const ACTS_ON: ActsOn = ActsOn::at(Self::INFO.place);
     /// Whether its torque is a constant, or one whose sign alone follows the motion: what a quasi-static analysis can find.

@@ -56,6 +56,10 @@ macro_rules! catalogue {
             pub fn prior(self) -> Prior {
                 match self { $(Self::$law => <$module::$law as Law>::PRIOR,)* Self::Own(own) => own.prior() }
             }
+            /// What it is called in a sentence, where that is not its kind with spaces.
+            pub const fn title(self) -> Option<&'static str> {
+                match self { $(Self::$law => <$module::$law as Law>::TITLE,)* Self::Own(_) => None }
+            }
             /// What it acts on.
             pub const fn acts_on(self) -> ActsOn {
                 match self { $(Self::$law => <$module::$law as Law>::ACTS_ON,)* Self::Own(_) => ActsOn::Joints }

@@ -18,6 +18,7 @@ impl Law for MotorInertia {
         parameters: &[Parameter::linear("inertia", "kg m²", 0.0, 10.0, 0.0)],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("rotor inertia");
     const ACTS_ON: ActsOn = ActsOn::Arm;
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).small(1e-3)]).in_family(Family::Segment);
 

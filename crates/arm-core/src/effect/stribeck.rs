@@ -24,6 +24,7 @@ impl Law for Stribeck {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("Stribeck friction");
     const SMOOTHED_BY: Option<usize> = Some(2);
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])

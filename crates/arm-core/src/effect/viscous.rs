@@ -15,6 +15,7 @@ impl Law for Viscous {
         parameters: &[Parameter::linear("viscosity", "N m s/rad", 0.0, 100.0, 0.0)],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("viscous damping");
     const PRIOR: Prior = Prior::FIRST
         .in_family(Family::Rate)
         .typically(0.2)

@@ -22,6 +22,7 @@ impl Law for Voluntary {
         ],
         states: 0,
     };
+    const TITLE: Option<&'static str> = Some("voluntary burst");
     const PRIOR: Prior = Prior::FIRST
         .of_nature(Nature::Burst)
         .in_family(Family::Muscle);

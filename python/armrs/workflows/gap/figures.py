@@ -14,7 +14,7 @@ from ...report.figures import Drawn, Figures, slug
 from . import maps
 from .core_input import channel_names, is_led
 from .found import GapFound
-from .headline import place_of
+from .headline import channel_label, place_of
 from .shapes import Portrait, portrait, telling_trial
 from .summary import summary
 
@@ -50,12 +50,6 @@ def steps_of(result: GapFound) -> list[str]:
     """Return the models that differ: where nothing was named, the last is the one before it."""
     together = [e for e in result.effects if e.trial is None]
     return ["given", "calibrated", "amended"] if together else ["given", "calibrated"]
-
-
-def channel_label(name: str) -> tuple[str, float]:
-    """Return how a channel is shown, and its factor: angles in degrees."""
-    quantity, unit = name.rsplit("_", 1)
-    return (f"{quantity} [°]", 180.0 / np.pi) if unit == "rad" else (f"{quantity} [{'N m' if unit == 'Nm' else unit}]", 1.0)
 
 
 def _before_and_after(result: GapFound) -> Drawn:
@@ -218,7 +212,7 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
 
 def _name_of(number: int, effect: Missing) -> str:
     """Return the name of the figure of an effect; `number` counts from 0."""
-    return f"effect-{number + 1}-{slug(place_of(effect.kind, effect.joint, effect.channel))}"
+    return f"effect-{number + 1}-{slug(place_of(effect.kind, effect.joint, effect.channel)).lower()}"
 
 
 def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...catalogue import catalogue
-from ...report.tables import number, spread, unit
+from ...catalogue import catalogue, title
+from ...report.tables import number, unit
 
 OPEN = 1.5
 """A channel is open as a whole where its gap exceeds so many times its floor."""
@@ -35,7 +35,7 @@ _CLOSES = 0.9
 something outside the catalogue is missing, false names close up to three quarters (docs/gap.md)."""
 _COUNTS = 0.1
 """Share of the floor by which a gap lies above it at least where the share of it that is closed is worth a number."""
-_NAMELESS = "something that the catalogue has no name for"
+_NAMELESS = "something that no effect of the catalogue explains"
 _NO_TEST = "there is no test trial to measure the gap on"
 _SIZED = 2
 """Effects whose sizes stand in the sentence; of more it only gives the names."""
@@ -43,9 +43,11 @@ _SIZED = 2
 
 def place_of(kind: str, joint: int | None, channel: str | None, joints: Sequence[str] = ()) -> str:
     """Return an effect with its place, in words."""
+    known = catalogue().get(kind)
+    if joint and known and known.where == "segment":
+        return f"{title(kind)} of segment {joint}"
     name = f" ({joints[joint - 1]})" if joint and joint <= len(joints) and joints[joint - 1] != f"joint {joint}" else ""
-    place = f" in joint {joint}{name}" if joint else f" of {channel}" if channel else ""
-    return kind.replace("_", " ") + place
+    return title(kind) + (f" in joint {joint}{name}" if joint else f" of {channel}" if channel else "")
 
 
 def effect_name(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
@@ -104,19 +106,20 @@ def headline(result: Mapping[str, Any]) -> str:
     held_out = any(g["calibrated"] for g in result["gap"].values())
     if not effects and not unexplained and not opened:
         if not tested:
-            return "No effect was found that these data show; without repeats, whether what is left is noise cannot be tested."
+            return "No missing effect was found; without repeats, whether what is left is noise cannot be tested."
         if not held_out:
-            return f"Nothing is missing that these data show; {_NO_TEST}."
-        return f"Nothing is missing: on held-out trials every channel is off by {_near(result['gap'])}what repeats differ by."
+            return f"Nothing is missing that these data could show; {_NO_TEST}."
+        return f"Nothing is missing that these data could show: on held-out trials no channel is off by more than {_near(result['gap'])}."
     if only_near(result):
         are, do = ("is", "does") if len(effects) == 1 else ("are", "do")
-        lacks = f"Something is missing that the catalogue has no name for; nearest to it {are} {_names(effects, joints)}, "
+        lacks = f"Something is missing that no effect of the catalogue explains; nearest to it {are} {_names(effects, joints)}, "
         lacks += f"which {do} not close the gap"
     elif effects:
-        lacks = f"The model lacks {_names(effects, joints)}"
+        one = len(effects) == 1
+        lacks = f"Missing from the model {'is' if one else 'are'} {_names(effects, joints)}"
         lacks += f", and {_beyond(result, opened)}" if unexplained else ", and that is not all" if opened else ""
     else:
-        lacks = "Something is missing that the catalogue has no name for" if unexplained else "No effect of the catalogue was found"
+        lacks = "Something is missing that no effect of the catalogue explains" if unexplained else "No effect of the catalogue was found"
         lacks += "" if unexplained else ", yet something is missing"
     return f"{lacks}: {_gap(result, opened)}." if held_out else f"{lacks}; {_NO_TEST}."
 
@@ -133,9 +136,10 @@ def _beyond(result: Mapping[str, Any], opened: Sequence[str]) -> str:
 
 
 def _near(gap: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return how many times what repeats differ by the widest channel is at most, in tenths; nothing where that is a tenth or less."""
+    """Return what the widest channel is off by at most: what repeats differ by, in tenths of it where it is a tenth more or wider."""
     widest = max((value / g["floor"] for g in gap.values() if (value := left(g)) is not None and g["floor"]), default=1.0)
-    return "" if widest <= _AS_REPEATS else f"at most {math.ceil(10.0 * widest - 1e-9) / 10.0:.1f} times "
+    one = "what repeats differ by"
+    return f"about {one}" if widest <= _AS_REPEATS else f"{math.ceil(10.0 * widest - 1e-9) / 10.0:.1f} times {one}"
 
 
 def _names(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> str:
@@ -148,8 +152,9 @@ def _names(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> str:
             together.setdefault(e["kind"], []).append(e["joint"])
     names = []
     for kind, places in together.items():
-        where = f"joint {places[0]}" if len(places) == 1 else f"joints {joined([str(j) for j in sorted(places)])}"
-        names.append(f"{kind.replace('_', ' ')} in {where}")
+        one = place_of(kind, places[0], None)
+        numbers = joined([str(j) for j in sorted(places)])
+        names.append(one if len(places) == 1 else f"{one.removesuffix(f' {places[0]}')}s {numbers}")
     # The list stands in brackets: joints go by their number, so that there are no brackets within brackets within brackets.
     names += [_name(e, ()) for e in effects if not (e["joint"] and _decided(e) and not e.get("trial"))]
     return f"{len(effects)} effects ({'; '.join(names)})"
@@ -170,7 +175,7 @@ def undecided(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
     stated = [effect, *effect["alternatives"]]
     here = {(e["joint"], e["channel"]) for e in stated}
     families = {family(e["kind"]) for e in stated}
-    kinds = joined([e["kind"].replace("_", " ") for e in stated], "or")
+    kinds = joined([title(e["kind"]) for e in stated], "or")
     where = _trial(effect)
     if len(here) > 1:
         return joined([effect_name(e, joints) for e in stated], "or") + f"{where}, which these movements cannot tell apart"
@@ -193,8 +198,17 @@ def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
     parameter = largest(effect["parameters"])
     if not _decided(effect) or parameter is None:
         return name
-    value = effect["parameters"][parameter]
-    return f"{name}, {parameter} {number(value['value'], value['std'])} ± {spread(value['std'])} {unit(value['unit'])}".rstrip()
+    return f"{name}, {with_interval(parameter, effect['parameters'][parameter])}"
+
+
+def with_interval(parameter: str, value: Mapping[str, Any]) -> str:
+    """Return a value with its name and unit, and the ends of its interval where it has one, to one digit of its standard deviation."""
+    digits = value["std"] and 10.0 * value["std"]
+    text = f"{parameter} {number(value['value'], digits)} {unit(value['unit'])}".rstrip()
+    if digits is None or not value.get("interval"):
+        return text
+    low, high = (number(end, digits) for end in value["interval"])
+    return f"{text} (95 %: {low} to {high})"
 
 
 def largest(parameters: Mapping[str, Mapping[str, Any]]) -> str | None:
@@ -210,16 +224,44 @@ def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
     shown = [name for name in opened if name in gap]
     name = shown[0] if shown else max(gap, key=lambda n: _times(gap[n], "calibrated"))
     channel = gap[name]
-    quantity, held_in = name.rsplit("_", 1)
-    quantity = spoken(quantity)
-    held_in = unit(held_in)
-    floor = f", where repeats differ by {channel['floor']:.2g} {held_in}" if channel["floor"] else ""
+    quantity = spoken(name.rsplit("_", 1)[0])
+    floor = f", where repeats differ by {amount(name, channel['floor'])}" if channel["floor"] else ""
     floor += place(result, name) if shown else ""
     value = left(channel)
     if shown or channel["after"] is None or not any(not e.get("trial") for e in result["effects"]):
-        return f"on held-out trials {quantity} is {'still ' if shown and result['effects'] else ''}off by {value:.2g} {held_in}{floor}"
+        return f"on held-out trials {quantity} is {'still ' if shown and result['effects'] else ''}off by {amount(name, value)}{floor}"
     them = "it" if len(result["effects"]) == 1 else "them"
-    return f"with {them}, the gap of {quantity} on held-out trials falls from {channel['calibrated']:.2g} to {value:.2g} {held_in}{floor}"
+    return (
+        f"with {them}, the gap of {quantity} on held-out trials falls from {amount(name, channel['calibrated'])} to "
+        f"{amount(name, value)}{floor}"
+    )
+
+
+def shown_in(name: str) -> tuple[float, str]:
+    """Return in which unit people read a channel, and how many of it are one of the unit in its name: angles in degrees."""
+    held_in = name.rsplit("_", 1)[1]
+    return (math.degrees(1.0), "°") if held_in == "rad" else (1.0, unit(held_in))
+
+
+def channel_label(name: str) -> tuple[str, float]:
+    """Return how a channel is labelled, and the factor to the unit in which it is shown.
+
+    >>> channel_label("Fz_N"), channel_label("tau2_Nm")
+    (('Fz [N]', 1.0), ('tau2 [N m]', 1.0))
+    """
+    factor, held_in = shown_in(name)
+    return f"{name.rsplit('_', 1)[0]} [{held_in}]", factor
+
+
+def amount(name: str, value: float | None) -> str:
+    """Return a value of a channel with the unit in which people read it.
+
+    >>> amount("Fz_N", 0.1623), amount("q3_rad", 0.01)
+    ('0.16 N', '0.57°')
+    """
+    factor, called = shown_in(name)
+    number = "–" if value is None else f"{factor * value:.2g}"
+    return f"{number}{'' if called == '°' else ' '}{called}"
 
 
 def spoken(name: str) -> str:

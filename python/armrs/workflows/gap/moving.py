@@ -13,9 +13,9 @@ from ...report.moving import SERIES, compared
 from ...report.series import Line, Panel, series
 from ..simulate import Simulated, simulate
 from .core_input import channel_names, is_led
-from .figures import STEPS, channel_label, steps_of
+from .figures import STEPS, steps_of
 from .found import GapFound
-from .headline import place_of
+from .headline import channel_label, place_of
 from .shapes import telling_trial
 
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._armrs import ChannelGap, Missing
-from ...catalogue import Kind, catalogue
+from ...catalogue import Kind, catalogue, title
 from ...report import plotting
 from ...report.figures import Drawn
 from ...report.sketch import sketch
 from ...report.tables import number, spread, unit
 from .found import GapFound
-from .headline import largest, left, only_near, place_of, still_open
+from .headline import largest, left, only_near, place_of, shown_in, still_open
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,7 @@ def summary(result: GapFound) -> Drawn:
     figure = plotting.figure(10.6, max(3.9, 0.34 * len(gaps) + 1.7, 0.3 * min(named, _LINES) + 1.5))
     left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.0, 1.05)})
     drawn_arm(result, left)
-    text = "Left, the arm in the middle of its movements, with the named effects where they act."
+    text = "Left, the arm in the middle of its movements, with the named effects where they act; ± is one standard deviation."
     if not named:
         text = "Left, the arm in the middle of its movements; no effect was named."
     if gaps:
@@ -50,8 +50,13 @@ def summary(result: GapFound) -> Drawn:
     else:
         right.set_axis_off()
         right.text(0.0, 0.5, "There is no test trial to measure the gap on.")
-    what = "comes nearest" if only_near(result.to_dict()) else "is missing"
-    return Drawn("summary", f"What {what}, and how much of the gap it closes", text, figure, "first")
+    if not named:
+        caption = "The gap, with no effect named"
+    elif only_near(result.to_dict()):
+        caption = "What comes nearest to what is missing, and how much of the gap it closes"
+    else:
+        caption = "What is missing from the model, and how much of the gap it closes"
+    return Drawn("summary", caption, text, figure, "first")
 
 
 # ---- the arm
@@ -88,7 +93,7 @@ def rivals(effect: Missing) -> list[str]:
 
 def _words(effect: Missing) -> str:
     """Return an effect with its size, and with its rivals where the data do not decide."""
-    text = effect.kind.replace("_", " ")
+    text = title(effect.kind)
     if getattr(effect, "decided", True) is False:
         return f"{text} (or {', '.join(rivals(effect))})"
     name = largest({n: {"value": v.value, "std": v.std, "unit": v.unit} for n, v in effect.parameters.items()})
@@ -151,8 +156,8 @@ def shrinking(result: GapFound, gaps: Mapping[str, ChannelGap], ax: Axes) -> Non
 
 def _change(name: str, seen: Sequence[tuple[str, float]], one: float, *, opened: bool) -> str:
     """Return what is fitted and what is left, `2.4 → 0.16 N`; `seen` are the steps in units of `one`."""
-    held_in = name.rsplit("_", 1)[1]
-    factor, text = (180.0 / np.pi, "°") if held_in == "rad" else (1.0, " N m" if held_in == "Nm" else f" {held_in}")
+    factor, held_in = shown_in(name)
+    text = held_in if held_in == "°" else f" {held_in}"
     ends = [f"{v:.2g}" if v < 99.5 else f"{v:.0f}" for v in (value * one * factor for step, value in seen if step != "before")]
     return " → ".join(ends) + text + ("  open" if opened else "")
 

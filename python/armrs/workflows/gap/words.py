@@ -24,17 +24,15 @@ _BETTER = 10.0
 def size(effect: Mapping[str, Any]) -> str:
     """Return the size of an effect with its interval."""
     name = headline.largest(effect["parameters"]) or next(iter(effect["parameters"]))
-    value = effect["parameters"][name]
-    text = f"{name} {number(value['value'], value['std'])} {unit(value['unit'])}".rstrip()
-    if value["std"] is None:
-        return text
-    low, high = (number(end, value["std"]) for end in value["interval"])
-    return f"{text} (95 %: {low} to {high})"
+    return headline.with_interval(name, effect["parameters"][name])
 
 
 def chance(effect: Mapping[str, Any]) -> str:
-    """Return the probability that an effect gains so much by chance."""
-    return f"with probability {effect['p_value']:.0e}" if effect["p_value"] > 1e-12 else "with a probability below 1e-12"
+    """Return how probable it is that an effect gains so much by chance."""
+    p = effect["p_value"]
+    if p < 1e-6:
+        return "with a probability below one in a million"
+    return f"with a probability of {p:.0%}" if p >= 0.01 else f"with a probability of one in {number(1.0 / p, 0.1 / p)}"
 
 
 def named(result: Mapping[str, Any]) -> list[str]:
@@ -160,10 +158,10 @@ def left(result: Mapping[str, Any]) -> list[str]:
         lines.append(_UNTESTED)
     for name in headline.still_open(result):
         channel = result["gap"][name]
-        quantity, held_in = name.rsplit("_", 1)
+        off, floor = (headline.amount(name, value) for value in (headline.left(channel), channel["floor"]))
         lines.append(
-            f"{headline.spoken(quantity)} is open on the test trials: off by {headline.left(channel):.2g} {unit(held_in)}, where repeats "
-            f"differ by {channel['floor']:.2g}{headline.place(result, name)}."
+            f"{headline.spoken(name.rsplit('_', 1)[0])} is open on the test trials: off by {off}, where repeats differ by {floor}"
+            f"{headline.place(result, name)}."
         )
     if result["unexplained"]["share"]:
         lines.append(f"Of the calibrated model's residual beyond noise on the fit trials, {result['unexplained']['share']:.1%} remains.")
@@ -231,7 +229,7 @@ def suspects(data: Mapping[str, Any], most: int = 10) -> Table:
 
 def heading(data: Mapping[str, Any]) -> str:
     """Return what stands above the named effects: under `unexplained` they may be no more than what comes nearest."""
-    return "What comes nearest to what is missing" if headline.only_near(data) else "What the model lacks"
+    return "What comes nearest to what is missing" if headline.only_near(data) else "Missing from the model"
 
 
 def missing(data: Mapping[str, Any]) -> Table:
@@ -251,7 +249,7 @@ def missing(data: Mapping[str, Any]) -> Table:
             if value["std"] is not None:
                 ends = " … ".join(number(end, value["std"]) for end in value["interval"])
             rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), ends, unit(value["unit"])])
-    head = ["effect", "at", "misfit without it" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"]
+    head = ["effect", "at", "off without it" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"]
     if all(row[6] is None for row in rows):  # nothing has an interval: there are no columns for it
         head, rows = [*head[:5], head[7]], [[*row[:5], row[7]] for row in rows]
     return Table(head, rows, 4)
@@ -271,7 +269,7 @@ def worth(data: Mapping[str, Any]) -> str:
         return "The share is what would be lost of all that is explained if this one effect were left out and everything else refitted."
     with_all = data["lack_of_fit"]["amended"]["ratio"] ** 0.5
     return (
-        "Misfit without it: how far the model would be off if this one effect were left out and everything else refitted, in root mean "
+        "Off without it: how far the model would be off if this one effect were left out and everything else refitted, in root mean "
         f"square and in units of what repeats differ by. With every effect it is off by {digits(with_all, 2)}. Disturbances of one "
         "trial have no such number."
     )
@@ -291,11 +289,11 @@ def gap(data: Mapping[str, Any]) -> Table:
             continue
         channel = {**channel, "last": headline.left(channel)}
         share = headline.closed(channel)
-        quantity, held_in = name.rsplit("_", 1)
-        values = [None if channel[step] is None else f"{channel[step]:.3g}" for step in steps]
+        label, factor = headline.channel_label(name)
+        values = [None if channel[step] is None else f"{factor * channel[step]:.3g}" for step in steps]
         rows.append(
             [
-                f"{quantity} [{unit(held_in)}]",
+                label,
                 *values,
                 *([None if share is None else f"{share:.0%}"] if named else []),
                 "open" if name in opened else None,
