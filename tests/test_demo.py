@@ -91,7 +91,7 @@ def test_the_search_finds_the_brakes_and_closes_the_gap(folder: Path, result: di
         channel = gap["gap"][name]
         assert channel["after"] < 1.1 * channel["floor"] < 0.6 * channel["calibrated"]
     assert result["verdict"].startswith(
-        "The search found both brakes (0.139 and 0.161 N m were hidden): missing from the model are Coulomb friction in joint 1 (shoulder), torque "
+        "The search found both brakes (0.139 and 0.161 N m were hidden). Missing from the model are Coulomb friction in joint 2 (elbow), torque 0.1"
     )
     assert "coulomb = 0.0" in (folder / "session/model.toml").read_text(encoding="utf-8")
 
@@ -118,7 +118,9 @@ def test_the_report_stands_alone_and_says_synthetic(folder: Path) -> None:
     assert page.count("<img") == page.count('src="data:image/png;base64,') >= 14
     # It opens with one sentence and the picture of the gap.
     assert (
-        page.index('class="verdict"') < page.index("What is missing, and how much of the gap it closes") < page.index(">What was done</h2>")
+        page.index('class="verdict"')
+        < page.index("What is missing from the model, and how much of the gap it closes")
+        < page.index(">What was done</h2>")
     )
     assert (folder / "copy.json").read_text(encoding="utf-8") == (folder / "demo.json").read_text(encoding="utf-8")
 

@@ -328,13 +328,13 @@ def _half_gap(parts: list[figures.Part]) -> list[float]:
 
 
 def search_verdict(gap: GapFound) -> str:
-    """Return what the search found beside what was hidden, in a sentence."""
+    """Return what the search found beside what was hidden, in two sentences."""
     said = headline(gap_data(gap))
     hidden = {("coulomb", joint) for joint in range(1, len(BRAKES) + 1)}
     if {(e.kind, e.joint) for e in gap.effects} != hidden or len(gap.effects) != len(hidden):
-        return f"The search did not name what was hidden, Coulomb friction in both joints: {said[0].lower()}{said[1:]}"
+        return f"The search did not name what was hidden, Coulomb friction in both joints. {said}"
     brakes = joined([f"{torque:.3f}" for torque in BRAKES])
-    return f"The search found both brakes ({brakes} N m were hidden): {said[0].lower()}{said[1:]}"
+    return f"The search found both brakes ({brakes} N m were hidden). {said}"
 
 
 def of_slow_movements(slow: GapFound) -> list[str]:
