@@ -34,10 +34,8 @@ _PLAINER = 0.005
 """A smaller error of zero is preferred while hand and handle are at most this much farther apart [m]: how well a handle is held."""
 
 
-def refuse_implausible(dataset: Dataset, *, robot_matters: bool = True) -> None:
+def refuse_implausible(dataset: Dataset) -> None:
     """Refuse a data set in which a sensor is dead, or angles of arm and robot cannot belong together.
-
-    Where the robot does not matter, its angles are only asked whether columns are swapped or in another unit.
 
     Raises
     ------
@@ -51,7 +49,7 @@ def refuse_implausible(dataset: Dataset, *, robot_matters: bool = True) -> None:
     if dataset.model.robot is not None:
         for trial in dataset.trials:
             if trial.robot_q is not None:
-                _refuse_apart(dataset.model, dataset.model.robot, trial, robot_matters)
+                _refuse_apart(dataset.model, dataset.model.robot, trial)
 
 
 def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
@@ -65,7 +63,7 @@ def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
                     yield BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
 
 
-def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool) -> None:
+def _refuse_apart(model: Model, robot: Robot, trial: Trial) -> None:
     """Compare where the measured angles put the hand with where the robot's put its handle."""
     assert trial.robot_q is not None
     good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
@@ -83,8 +81,6 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial, robot_matters: bool)
         if reading is not None and best < min(_MEETS * own, 0.1 * reach):
             found = Text(f"angles that put the hand {own:.3g} m from the robot's handle")
             raise BadInput(reading.place, found, reading.allowed, file=trial.file)
-    if not robot_matters:
-        return
     path = _rms(handle - handle.mean(axis=0))
     for j, angle in enumerate(q.T, start=1):
         level = constant(angle)

@@ -323,7 +323,7 @@ def passive_moments(
     bins = checks.whole("bins", bins, least=2, most=1000)
     cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
     tell = checks.progress(progress)
-    refuse_implausible(dataset, robot_matters=False)
+    refuse_implausible(dataset)
     trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
     trials, conditioned = _without_preconditioning(trials)
     wrong = find_wrong_setup(dataset)

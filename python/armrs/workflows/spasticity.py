@@ -210,7 +210,7 @@ def spasticity(
     # A slow recording is not refused for a default: it is asked with what it holds.
     cutoff = min(cutoff, 0.4 * slowest)
     tell = checks.progress(progress)
-    refuse_implausible(dataset, robot_matters=False)
+    refuse_implausible(dataset)
     # Activity of the muscles is what is looked for here: samples with it count.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
     # Torques of the contact are products of forces with angles: the low-pass comes after them.
