@@ -60,7 +60,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "synthetic is no number": (IDENTIFY, lambda f: f.edit("dataset.toml", "synthetic = true", "synthetic = 1"), "synthetic: found 1, allowed true or false"),
     "mass of zero": (IDENTIFY, lambda f: f.edit("model.toml", "mass = 1.58", "mass = 0.0 #"), "[[arm.segment]] 1, mass: found 0.0"),
     "mass that is text": (MOVE, lambda f: f.edit("truth.toml", "mass = 1.44", 'mass = "x" #'), "[[arm.segment]] 1, mass: found 'x'"),
-    "no trial file": (PASSIVE, lambda f: (f.path / "trials/slow_2.csv").unlink(), "slow_2.csv: file: found no such file"),
+    "no trial file": (PASSIVE, lambda f: (f.path / "trials/slow_2.csv").unlink(), "slow_2.csv: [[trial]] 2 of dataset.toml, file: found no such file"),
     "unknown unit": (IDENTIFY, lambda f: f.edit("trials/slow_1.csv", "q1_rad", "q1_grad"), "header: found 'q1_grad', allowed a known unit"),
     "degrees under radians": (IDENTIFY, lambda f: f.cell(9, 1, "-1000"), "line 9, column q1_rad: found -1000.0"),
     "text in a cell": (PASSIVE, lambda f: f.cell(9, 2, "abc"), "line 9, column q2_rad: found 'abc'"),

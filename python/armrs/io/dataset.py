@@ -15,14 +15,14 @@ import numpy as np
 
 from .. import checks
 from ..anthropometry import literature_model
-from ..errors import ArmrsError, BadInput, BadInputs, Text
+from ..errors import ArmrsError, BadInput, BadInputs, Text, nearest
 from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, TrialEntry, load_model
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
 from ..telling import telling
 from . import files
 from .faults import faults_of
 from .muscle_activity import joint_activity, mark_activity
-from .samples import SUFFIXES, write_samples
+from .samples import NO_FILE, SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
 FILE = "dataset.toml"
@@ -282,7 +282,18 @@ def read_entry(path: Path, entry: TrialEntry, n_joints: int, description: Descri
             role=entry.role,
         )
     except BadInput as error:
-        raise error.within(file=path) from None
+        raise (_missing(path, entry, description) if error.found is NO_FILE else error.within(file=path)) from None
+
+
+def _missing(path: Path, entry: TrialEntry, description: Description) -> BadInput:
+    """Return the refusal of a trial without a file: which entry names it, and which file that no entry names is called most like it."""
+    named = [one.file for one in description.trials]
+    taken, near = {Path(file).name for file in named}, None
+    with suppress(OSError):
+        there = [one.name for one in path.parent.iterdir() if one.suffix.lower() in SUFFIXES]
+        near = nearest(path.name, [name for name in there if name not in taken])
+    hint = near and f"in that folder and in no entry: {near}"
+    return BadInput(f"[[trial]] {named.index(entry.file) + 1} of {FILE}, file", NO_FILE, "a file that exists", file=path, hint=hint)
 
 
 def name_of(path: Path, description: Description) -> str:

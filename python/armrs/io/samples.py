@@ -20,6 +20,7 @@ from .files import may_replace, replacing
 
 SUFFIXES = (".csv", ".parquet")
 MOST_COLUMNS = 4096
+NO_FILE = Text("no such file")
 NUMBER = "a finite number, or an empty cell where the sample is missing"
 
 
@@ -69,7 +70,7 @@ def read_samples(path: Path) -> Samples:
         raise BadInput("file", Text(f"suffix {path.suffix!r}"), " or ".join(SUFFIXES))
     try:
         if not path.is_file():
-            raise BadInput("file", Text("a folder" if path.is_dir() else "no such file"), "a file that exists")
+            raise BadInput("file", Text("a folder") if path.is_dir() else NO_FILE, "a file that exists")
         samples = _read_csv(path) if suffix == ".csv" else _read_parquet(path)
     except OSError as error:
         raise BadInput("file", Text(error.strerror or "unreadable"), "a file that can be read") from None
