@@ -155,6 +155,41 @@ def test_two_joints_are_not_one_problem_and_one_more() -> None:
     assert [p.text for p in grouped(of_files)] == ["trials/slow_1.csv and 1 more: one cause"]
 
 
+def test_angles_in_degrees_are_one_line(session: Path, tmp_path: Path) -> None:
+    """Each trial and joint had a line of its own, with its own row and value."""
+    degrees: dict[str, Change] = {f"{name}_{k}": lambda s: s * [1.0, 180.0 / np.pi, 180.0 / np.pi, 1.0, 1.0] for name, k in TRIALS}
+    [problem] = grouped(check_dataset(changed(session, tmp_path / "set", degrees)).problems)
+    assert re.search(
+        r"_1\.csv and 5 more: line \d+, columns q1_rad, q2_rad: found -?[\d.]+, allowed .* \(looks like degrees\)$", problem.text
+    )
+
+
+def test_a_column_that_is_missing_is_not_to_be_removed(session: Path, tmp_path: Path) -> None:
+    head = (session / "trials" / "slow_1.csv").read_text(encoding="utf-8").splitlines()[0]
+    for name, (old, said) in {"angle": ("q2_rad", "no column for q2"), "force": ("Fz_N", "no column for Fz")}.items():
+        folder = changed(session, tmp_path / name, {"slow_1": same}, {"slow_1": head.replace(old, "emg_x")})
+        (problem,) = [p for p in check_dataset(folder).problems if said in p.text]
+        assert problem.next_step == "add the column, or give this name to the one that holds it"
+
+
+@pytest.mark.parametrize("model", [True, False])
+def test_a_trial_that_is_missing_is_named_by_its_entry(model: bool, session: Path, tmp_path: Path) -> None:
+    """Without a model, too, where the joints are counted in the header."""
+    folder = changed(session, tmp_path / "set", {})
+    trials = folder / "trials"
+    (trials / "slow_2.csv").rename(trials / "slow-2.csv")
+    if not model:
+        (folder / "model.toml").unlink()
+    number = [t.file for t in armrs.load_dataset(session).trials].index("trials/slow_2.csv") + 1
+    said = f"slow_2.csv: [[trial]] {number} of dataset.toml, file: found no such file, allowed a file that exists (in that folder and in no entry: "
+    (problem,) = [p for p in check_dataset(folder).problems if said in p.text]
+    assert problem.text.endswith("slow-2.csv)") and problem.next_step == "correct the file, or its name in dataset.toml"
+    for path in trials.iterdir():
+        path.rename(path.with_suffix(".txt"))
+    (problem,) = [p for p in grouped(check_dataset(folder).problems) if "found no such file" in p.text]
+    assert problem.text.endswith("and 5 more: [[trial]] 1 of dataset.toml, file: found no such file, allowed a file that exists")
+
+
 def test_the_next_step_fits_the_cell(session: Path, tmp_path: Path) -> None:
     """Of a decimal comma and of a column that stands twice it was: correct its unit, its sign, or its values."""
     folder = changed(session, tmp_path / "set", {"slow_1": same, "slow_2": same})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -188,6 +189,8 @@ def _remedy(error: ArmrsError) -> str:
         return "correct the file that it names"
     if (error.hint or error.allowed).endswith("or that file"):
         return "give the folder that armrs import, record or demo wrote"
+    if str(error.found).startswith(("no column for", "neither forces nor torques")):
+        return "add the column, or give this name to the one that holds it"
     place = error.place.rpartition(", ")[2]
     for start, step in _FILES.items():
         if place.startswith(start):
@@ -244,6 +247,12 @@ _OF_VALUES = (*_OF_FORCES, "hand and handle", "at a higher rate", "in the fit tr
 """The same, with the angles or the forces."""
 _MEASURED = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?(?= (?:mm?|s|rad(?:/s)?|N(?: m)?|Hz|%|samples)(?![\w/]))")
 """A measured number, which is followed by its unit."""
+_OF_ONE = re.compile(
+    r"\[\[trial\]\] \d+ of | \(in that folder and in no entry: [^)]*\)|(?:line|row) \d+|\b\d+ times|\bonce"
+    r"|(?<=found )[-+]?\d[\d.]*(?:e[-+]?\d+)?(?=,)"
+)
+"""What else differs between files with one cause: the entry, the row, the first value that was found there, and how often."""
+_COLUMN = re.compile(r"\bcolumn (\w+)(?=:| jumps)")
 
 
 def _not_implied(problems: Iterable[Problem]) -> list[Problem]:
@@ -300,8 +309,10 @@ def _trials(folder: Path, description: Description, model: Model | None, problem
 
 def _joints_of(path: Path) -> int:
     """Return of how many joints a trial has angles; where the model cannot be read, nothing else tells."""
-    numbers = [int(found[1]) for name in header_of(path) if (found := re.match(r"q([1-9])_", name))]
-    return max(numbers, default=1)
+    header: Sequence[str] = ()
+    with suppress(OSError):  # `read_entry` says why the file cannot be read
+        header = header_of(path)
+    return max((int(found[1]) for name in header if (found := re.match(r"q([1-9])_", name))), default=1)
 
 
 def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
@@ -371,17 +382,31 @@ def _of_file(problem: Problem) -> tuple[str, str]:
 
 
 def grouped(problems: Sequence[Problem]) -> list[Problem]:
-    """Return problems with those together that differ by their file, or by what was measured in it, alone; of such, the first is shown."""
+    """Return problems with those of one cause together, each where its first stood.
+
+    They have one cause if they differ only by their file, by the column, or by what was measured there. The first is shown, with the number
+    of the other files and the names of all columns.
+    """
     together: dict[tuple[str, str, str], list[Problem]] = {}
     for p in problems:
-        file, rest = _of_file(p)
-        together.setdefault((p.level, _MEASURED.sub("", rest) if file else rest, p.next_step), []).append(p)
-    lines = []
-    for alike in together.values():
-        first = alike[0]
-        file, rest = _of_file(first)
-        lines.append(replace(first, text=f"{file} and {len(alike) - 1} more: {rest}") if file and len(alike) > 1 else first)
-    return lines
+        together.setdefault((p.level, _cause(p), p.next_step), []).append(p)
+    return [_one_of(alike) for alike in together.values()]
+
+
+def _cause(problem: Problem) -> str:
+    """Return the text of a problem without what differs between files with one cause; of what is of no file, the whole text."""
+    file, rest = _of_file(problem)
+    return _COLUMN.sub("column", _OF_ONE.sub("", _MEASURED.sub("", rest))) if file else rest
+
+
+def _one_of(alike: Sequence[Problem]) -> Problem:
+    """Return the first of the problems with one cause, with the number of the other files and the names of all columns."""
+    read = [_of_file(p) for p in alike]
+    (file, rest), others = read[0], len({file for file, _ in read}) - 1
+    names = list(dict.fromkeys(name for _, text in read for name in _COLUMN.findall(text)))
+    if len(names) > 1:
+        rest = _COLUMN.sub(f"columns {', '.join(names)}", rest, count=1)
+    return replace(alike[0], text=f"{file}{f' and {others} more' if others else ''}: {rest}") if file else alike[0]
 
 
 def _other_arm(dataset: Dataset) -> list[Problem]:
