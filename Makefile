@@ -197,8 +197,9 @@ docs: $(STAMPS)/docs ## the documentation site, in out/site: no warning, no brok
 	NO_MKDOCS_2_WARNING=1 $(VENV)/docs/bin/mkdocs build --strict --quiet --site-dir out/site
 	$(VENV)/docs/bin/python scripts/check_site.py
 
-guide: ## add the effect of the developer guide to a copy, as it says, and test it
+guide: $(STAMPS)/dev ## add the effect of the developer guide to a copy, as it says, and test it; and the numbers it states
 	$(PYTHON) scripts/developer_guide.py
+	$(BIN)/python -m pytest --quiet tests/test_stated.py
 
 # The kernels and the verdict; what survives is answered in docs/developer.md.
 MUTATED := crates/arm-core/src/dynamics.rs crates/arm-core/src/gravity.rs crates/arm-core/src/inertia.rs crates/arm-core/src/coriolis.rs

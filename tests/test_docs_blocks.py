@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
 import shlex
@@ -178,14 +179,29 @@ def test_systems_of_the_cosim_page_are_read(folder: Path) -> None:
 
 def test_the_effect_of_the_developer_guide_fits_the_catalogue() -> None:
     """It names what the law of another kind names, from the same modules; `make guide` compiles it and runs its tests."""
-    shown = next(content for language, _, content in blocks(DOCS / "developer.md") if language == "rust")
+    (_, shown), (of, shaped) = ((name, content) for language, name, content in blocks(DOCS / "developer.md") if language == "rust")
     like = (ROOT / "crates/arm-core/src/effect/quadratic_drag.rs").read_text(encoding="utf-8")
     assert [line for line in shown.splitlines() if line.startswith("use ")] == [
         line for line in like.splitlines() if line.startswith("use ")
     ]
+    assert shaped in (ROOT / of.removeprefix("of ")).read_text(encoding="utf-8")
     for _, name, content in blocks(DOCS / "developer.md"):
         for path in re.findall(r"scripts/\w+\.(?:py|sh)", f"{name} {content}"):
             assert (ROOT / path).is_file(), path
+
+
+def test_the_session_of_the_developer_guide_names_its_effect(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With the law of the catalogue that is most like that of the guide, which is compiled by `make guide` alone."""
+    demo.true_model().write("truth.toml")
+    (shown,) = (content for _, name, content in blocks(DOCS / "developer.md") if name == "swirl.toml")
+    text = shown.replace('"swirl"', '"quadratic_drag"').replace("swirl =", "drag =").replace("demo/truth.toml", "truth.toml")
+    Path("swirl.toml").write_text(text, encoding="utf-8")
+    ran = [words for words in commands(DOCS / "developer.md") if words[0] in ("record", "gap")]
+    assert [words[0] for words in ran] == ["record", "gap"]
+    for words in ran:
+        assert cli.main(words) == 0, capsys.readouterr().err
+    named = json.loads(Path("gap/gap.json").read_text(encoding="utf-8"))["effects"]
+    assert [(effect["kind"], effect["joint"]) for effect in named] == [("quadratic_drag", 2)]
 
 
 def test_the_page_of_the_command_line_is_that_of_the_commands() -> None:
