@@ -84,7 +84,9 @@ def test_gaps_stay_gaps(session: Session) -> None:
         return lines[:40] + lines[70:]
 
     session.edit_lines(hole)
-    first = armrs.passive_moments(session.folder).trials[0]
+    data = armrs.load_dataset(session.folder)
+    # Its columns are numbers without meaning: nothing holds this arm.
+    first = armrs.passive_moments(data.replace(model=data.model.replace(robot=None))).trials[0]
     assert np.isnan(first.moment).any()
     assert np.isfinite(first.moment).any()
     assert (first.direction[np.isnan(first.q)] == 0).all()

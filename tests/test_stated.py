@@ -13,6 +13,7 @@ from matplotlib.colors import rgb_to_hsv, to_hex, to_rgb
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
 import armrs
+from armrs.analysis import double_exponential
 from armrs.catalogue import catalogue
 from armrs.report import plotting, tables
 from armrs.report import words as common
@@ -199,6 +200,16 @@ def test_tolerances_are_warned_of_at_the_multiples_that_files_md_says() -> None:
         return tuple(len(identify._beyond_tolerance([own], tolerance, *step)) for step in steps)  # type: ignore[return-value, list-item]
 
     assert [told(f * by) for f in (noted, warned) for by in (0.99, 1.01)] == [(0, 0), (1, 0), (1, 0), (0, 1)]
+
+
+def test_the_tables_of_passive_moments_are_explained_beside_them() -> None:
+    """`inertial share`, `upper` and `linear law enough` stood on the terminal without a word."""
+    head = tables.passive({"curves": []}).head
+    assert {name.partition(" [")[0] for name in head[4:]} == {"elastic mean", "half width", "± std", "inertial share"}
+    for name in head[4:]:
+        assert name.partition(" [")[0] in common.PASSIVE_MEANING.lower(), name
+    for name in (*double_exponential.NAMES, "coupling", "moment", "mean coupling", "linear law"):
+        assert name.rpartition("_")[2] in common.DEPENDENCE_MEANING.lower().replace("mean\ncoupling", "mean coupling"), name
 
 
 def test_an_interval_that_ends_at_a_limit_says_so() -> None:

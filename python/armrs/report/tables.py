@@ -283,9 +283,9 @@ def dependence(data: Mapping[str, Any]) -> Table:
     ]
     rows.append(["mean coupling [N m/rad]", *(_with_interval(d["mean_coupling"]) for d in found)])
     rows.append(
-        ["coupled on average, by this joint alone", *(f"{'yes' if d['coupled'] else 'no'} (p {_chance(d['p_value'])})" for d in found)]
+        ["mean coupling not zero, by this joint alone", *(f"{'yes' if d['coupled'] else 'no'} (p {_chance(d['p_value'])})" for d in found)]
     )
-    rows.append(["linear law enough", *(f"{'yes' if d['linear'] else 'no'} (p {_chance(d['linear_p_value'])})" for d in found)])
+    rows.append(["linear law is enough", *(f"{'yes' if d['linear'] else 'no'} (p {_chance(d['linear_p_value'])})" for d in found)])
     return Table(["", *(f"{d['joint_name']}, {d['adjacent_name']} held" for d in found)], rows)
 
 

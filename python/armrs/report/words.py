@@ -24,16 +24,18 @@ HISTORY_MEANING = (
 )
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: the torque of the contact force, less weight and inertia. "
-    "The mean of both directions is its elastic part, half their difference its dissipative part. The mean also contains errors in the "
-    "masses of the model. Only the weight and inertia of the model are subtracted: its springs, friction and other effects remain in these "
-    "moments."
+    "Elastic mean: mean of both directions of motion, which also contains errors in the masses of the model. Half width: half of their "
+    "difference, the dissipative part, with its standard deviation over the repeats (± std). Inertial share: size of the inertial torque "
+    "that was subtracted, relative to the moment. Only the weight and inertia of the model are subtracted: its springs, friction and "
+    "other effects remain in these moments."
 )
 
 DEPENDENCE_MEANING = (
-    "The elastic moment of a joint as a double exponential of its angle (upper and lower: its size at both ends of what was measured), "
-    "a slope, and a coupling: how much it changes with the adjacent angle. Where this linear law is not enough, each end moves with the "
-    "adjacent angle as well: by minus its ratio for each degree of it. The mean coupling is that of the linear law; it is tested against a "
-    "model without it, over trials."
+    "The elastic moment of a joint as a function of its own and of the adjacent angle: an exponential at each end of the measured range "
+    "(upper and lower: its moment at that end; steepness: how fast it rises), a straight line (stiffness), a coupling (change with the "
+    "adjacent angle) and a constant (moment). Intervals are in brackets; a term of zero is not needed. Where this law, which is linear in "
+    "the adjacent angle, is not enough, each end moves with the adjacent angle as well: by minus its ratio for each degree of it. The "
+    "mean coupling is that of the linear law; a small p speaks for a coupling, or against the linear law."
 )
 
 INTERVALS = (
@@ -282,8 +284,9 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     for line in couplings(result):
         print(line)
     for check in result["checks"]:
+    print(f"{PASSIVE_MEANING}\n")
         print(check["text"])
-    print("Only the weight and inertia of the model are subtracted: its springs, friction and other effects remain in these moments.")
+        print(f"{DEPENDENCE_MEANING}\n")
     followed(result)
     files_written(written)
 
