@@ -212,6 +212,20 @@ def test_the_tables_of_passive_moments_are_explained_beside_them() -> None:
         assert name.rpartition("_")[2] in common.DEPENDENCE_MEANING.lower().replace("mean\ncoupling", "mean coupling"), name
 
 
+def test_the_summary_of_an_identification_counts_what_its_tables_show() -> None:
+    """It said 6 of 8, the first table had 4 rows, and 3 of the parameters were measured."""
+    item = {"name": "m1", "kind": "segment", "joint": 1, "value": 2.0, "std": 0.1, "interval": (1.8, 2.2), "unit": "kg", "caveat": None}
+    parameters = [item | {"name": name, "decided_by": by} for name, by in (("m1", "prior"), ("m2", "data"), ("l1", "bound"))]
+    combinations = [item | {"name": name, "kind": "combination", "decided_by": "data"} for name in ("m1*l1", "m2")]
+    result = {"verb": "identify", "status": "solved", "parameters": parameters, "combinations": combinations, "rank": 3, "unknowns": 4}
+    assert len(tables.measured(result)) == 2
+    assert common.verdict(result) == (
+        "Measured: 2 quantities (first table). Of the 3 parameters, the measurement decides 1, the model as given 1, a physical limit 1."
+    )
+    one = result | {"combinations": []}
+    assert common.verdict(one).startswith("Measured: 1 quantity (first table).")
+
+
 def test_an_interval_that_ends_at_a_limit_says_so() -> None:
     """`0.0040 ± 0.0092` stood beside `0.0000 … 0.0241` without a word."""
     even = {

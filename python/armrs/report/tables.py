@@ -47,9 +47,9 @@ _EVEN = 0.95
 """An interval of which one side is that much shorter than the other ends at a limit."""
 
 
-def how_many(number: int, what: str) -> str:
-    """Return a number of things in words: one of them without the plural."""
-    return f"{number} {what}{'s' * (number != 1)}"
+def how_many(number: int, what: str, several: str | None = None) -> str:
+    """Return a number of things in words: one of them without the plural, which ends in s unless it is given."""
+    return f"{number} {what if number == 1 else several or f'{what}s'}"
 
 
 def probability(value: float) -> str:

@@ -39,8 +39,9 @@ DEPENDENCE_MEANING = (
 )
 
 INTERVALS = (
-    "± is one standard deviation. Where the data alone decide, intervals reach beyond two of them to each side: they take Student's t "
-    "with few independent blocks. They end at physical limits."
+    "± is one standard deviation. Intervals take Student's t with Satterthwaite's degrees of freedom: the number of independent data "
+    "blocks less one where the scatter of the data alone makes up the standard deviation, and more, up to the normal distribution, the "
+    "more of it comes from the model as given or from the tolerances of the sensors. They end at physical limits."
 )
 
 PREDICTED = (
@@ -88,16 +89,15 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 def _identified(result: Mapping[str, Any]) -> str:
     by = [e["decided_by"] for e in result["parameters"]]
-    counts = [f"the measurement determines {by.count('data')}", f"the model as given {by.count('prior')}"]
+    counts = [f"the measurement decides {by.count('data')}", f"the model as given {by.count('prior')}"]
     if "bound" in by:
         counts.append(f"a physical limit {by.count('bound')}")
     ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
     if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
         ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
-    return (
-        f"The movements determine {result['rank']} independent combinations of the {result['unknowns']} unknowns. "
-        f"Of the {len(by)} parameters that follow from these and from the model as given, {', '.join(counts)}.{ending}"
-    )
+    shown = tables.measured(result)
+    measured = tables.how_many(len(shown), "quantity", "quantities") + (" (first table)" if shown else "")
+    return f"Measured: {measured}. Of the {len(by)} parameters, {', '.join(counts)}.{ending}"
 
 
 def _simulated(result: Mapping[str, Any]) -> str:
@@ -198,6 +198,11 @@ def cannot_tell(result: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def independent(result: Mapping[str, Any]) -> str:
+    """Say of how many unknowns the movements show how much."""
+    return f"of {result['unknowns']} unknowns the movements show {result['rank']} independent combinations"
+
+
 def _trade(line: str, units: Mapping[str, str]) -> str:
     """Say in a sentence which quantities trade: `m2 and m1*l1 trade 1 : -0.376`."""
     names, trades, ratio = tables.symbol(line).partition(" trade ")
@@ -223,7 +228,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
     lines = cannot_tell(result)
     if lines:
-        print("What cannot be told apart")
+        print(f"What cannot be told apart: {independent(result)}")
         print("\n".join(f"  {line}" for line in lines))
     if not data["test"]["trials"]:
         print("No test trials: nothing was checked on data that the fit has not seen.")
@@ -279,14 +284,14 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print passive moments."""
     head(result, verdict(result))
     show(f"Passive moments below {result['cutoff_Hz']:.3g} Hz, averaged over angles", tables.passive(result))
+    print(f"{PASSIVE_MEANING}\n")
     if result["dependence"]:
         show("Elastic moment against own and adjacent angle", tables.dependence(result))
+        print(f"{DEPENDENCE_MEANING}\n")
     for line in couplings(result):
         print(line)
     for check in result["checks"]:
-    print(f"{PASSIVE_MEANING}\n")
         print(check["text"])
-        print(f"{DEPENDENCE_MEANING}\n")
     followed(result)
     files_written(written)
 

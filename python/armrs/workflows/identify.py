@@ -186,7 +186,7 @@ class Identified(Tabular, Series):
         return self.result.model
 
     def __repr__(self) -> str:
-        known = f"{self.rank} of {self.unknowns} unknowns determined"
+        known = f"{self.rank} independent combinations of {self.unknowns} unknowns"
         return f"Identified({self.dataset.name!r}, {self.method} method, {self.status}: {known}; {'; '.join(map(str, self.combinations))})"
 
     def followed(self) -> tuple[Estimate, ...]:
