@@ -184,7 +184,13 @@ def test_the_tutorial_runs_and_prints_what_it_shows(
                 out, err = capsys.readouterr()
                 assert status == ("# ends with status 1" in line), err
                 printed += out
-    assert set(verbs) == {"demo", "passive", "identify", "simulate", "report"}
-    for file in re.findall(r"`([a-z]+/[a-z./]+)`", (DOCS / "tutorial.md").read_text(encoding="utf-8")):
+    assert set(verbs) == {"demo", "check", "passive", "identify", "simulate", "gap", "report"}
+    text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    found = json.loads(Path("identified/identified.json").read_text(encoding="utf-8"))
+    reach = {e["name"]: (e["interval"][1] - e["value"]) / e["std"] for e in (*found["combinations"], *found["calibration"])}
+    for said, name in re.findall(r"([\d.]+)(?: standard deviations)? \(`(m2·l2|time delay)`\)", text):
+        assert f"{reach[name.replace('·', '*')]:.2f}" == said
+    assert f"{min(reach.values()):.2f} {max(reach.values()):.2f}" == "1.96 2.16"
+    for file in re.findall(r"`([a-z]+/[a-z./]+)`", text):
         if not file.startswith("examples/"):
             assert Path(file).exists(), file
