@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 import armrs
 from armrs import cli
+from armrs.analysis.passivity_checks import gives_energy
 from armrs.workflows.demo import BRAKES
 from conftest import Session
 
@@ -69,6 +71,20 @@ def test_a_fast_movement_is_warned_of(slow_arm: Path) -> None:
     result = armrs.passive_moments(armrs.load_dataset(slow_arm).replace(trials=(trial,), model=truth), cutoff=5.0)
     assert len(result.warnings) >= 1
     assert "fast: not slow for joint 1: inertial torques are" in result.warnings[0]
+
+
+def test_a_joint_that_gives_energy_is_warned_of(slow_arm: Path) -> None:
+    """Without a robot, angles in another unit gave negative friction without a word."""
+    data = armrs.load_dataset(slow_arm)
+    data = data.replace(model=data.model.replace(robot=None))
+    mirrored = tuple(dataclasses.replace(t, force_on_arm=None if t.force_on_arm is None else -t.force_on_arm) for t in data.trials)
+    said = [
+        [line for line in armrs.passive_moments(d).warnings if "gives no energy" in line] for d in (data, data.replace(trials=mirrored))
+    ]
+    assert said[0] == [] and len(said[1]) == 1
+    assert said[1][0].startswith("half width of the hysteresis below zero: joint 1 (slow), joint 2 (slow): ")
+    chance = [("slow", 1, (-0.02, 0.001)), ("slow", 1, (-0.02, -0.001)), ("slow", 2, (float("nan"), float("nan")))]
+    assert gives_energy(chance) == []
 
 
 def test_a_held_joint_has_no_curve(slow_arm: Path) -> None:

@@ -15,6 +15,9 @@ RISE = 2.0
 """Activity that rises above this many times its own median is a contraction."""
 SLOW = 0.1
 """Largest share of inertial torques at which a movement counts as slow."""
+CLEAR = 3.0
+"""A half width is clearly below zero when it is so many half widths of its 95 % interval: chance does that in one of a thousand joints
+without friction at four repeats."""
 
 
 @dataclass(frozen=True)
@@ -75,3 +78,28 @@ def slow_enough(shares: Sequence[tuple[str, int, float]]) -> Check:
     found = f"inertial torques are at most {100 * share:.2g} % of the passive moment"
     where = f"(joint {joint}, {configuration}; allowed {100 * SLOW:.0f} %)"
     return Check("slow", share <= SLOW, f"{'Slow enough' if share <= SLOW else 'Not slow'}: {found} {where}.")
+
+
+def not_slow(shares: Sequence[tuple[str, int, float]]) -> list[str]:
+    """Return the joints that did not move slowly, a line each; takes what `slow_enough` takes."""
+    return [
+        f"{configuration}: not slow for joint {joint}: inertial torques are {100 * share:.0f} % of the passive moment, "
+        f"more than {100 * SLOW:.0f} %"
+        for configuration, joint, share in shares
+        if share > SLOW
+    ]
+
+
+def gives_energy(half_widths: Sequence[tuple[str, int, tuple[float, float]]]) -> list[str]:
+    """Return in one line the joints whose hysteresis gives energy, none where there are none.
+
+    Takes configuration, joint (from 1) and the interval of the half width of the hysteresis [N m], NaN where nothing was repeated.
+    """
+    wrong = [f"joint {joint} ({name})" for name, joint, (low, high) in half_widths if low + high < -CLEAR * (high - low)]
+    if not wrong:
+        return []
+    joints = ", ".join(wrong)
+    return [
+        f"half width of the hysteresis below zero: {joints}: a relaxed joint gives no energy. Are angles or forces in another unit or "
+        "direction, or late against each other, or were muscles active?"
+    ]

@@ -345,10 +345,12 @@ def passive_moments(
                 f"same angles for a low-pass at {cutoff:g} Hz: left out"
             )
         warnings += _doubtful(dataset, repeats)
-    slow = [(c.configuration, c.joint, c.inertial_share) for c in curves]
-    assumptions = (passivity_checks.muscles_silent(dataset.trials), passivity_checks.slow_enough(slow))
+    shares = [(c.configuration, c.joint, c.inertial_share) for c in curves]
+    assumptions = (passivity_checks.muscles_silent(dataset.trials), passivity_checks.slow_enough(shares))
     if assumptions[0].passed is False:
         warnings.append(assumptions[0].text)
+    warnings += passivity_checks.gives_energy([(c.configuration, c.joint, c.interval("half_width")) for c in curves])
+    warnings += passivity_checks.not_slow(shares)
     fitted = _dependence(curves)
     both = tuple(
         joint_coupling.together(one, other)
@@ -356,7 +358,7 @@ def passive_moments(
         for other in fitted
         if (one.joint, one.adjacent) == (other.adjacent, other.joint) and one.joint < other.joint
     )
-    return PassiveMoments(trials, tuple(curves), cutoff, (*warnings, *_not_slow(curves)), dataset, both, fitted, assumptions)
+    return PassiveMoments(trials, tuple(curves), cutoff, tuple(warnings), dataset, both, fitted, assumptions)
 
 
 def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[TrialMoments, ...], list[str]]:
@@ -589,12 +591,3 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
             where = f"{repeats[0].trial.configuration}: its repeats have joint {j} up to {np.degrees(np.ptp(at)):.3g}° apart"
             lines.append(f"{where}: another unit, swapped columns, or two configurations?")
     return lines
-
-
-def _not_slow(curves: Sequence[PassiveCurve]) -> tuple[str, ...]:
-    return tuple(
-        f"{c.configuration}: not slow for joint {c.joint}: inertial torques are {100 * c.inertial_share:.0f} % of the passive moment, "
-        f"more than {100 * passivity_checks.SLOW:.0f} %"
-        for c in curves
-        if c.inertial_share > passivity_checks.SLOW
-    )
