@@ -18,12 +18,18 @@ GUIDE = ROOT / "docs" / "developer.md"
 TESTS = Path("crates/arm-core/tests/suite")
 
 
-def main() -> None:
-    """Copy, follow the guide, test."""
+def shown() -> tuple[str, str, str, str]:
+    """Return what the guide shows: the file of the law, the law, its entry in the catalogue and the line of its test."""
     text = GUIDE.read_text(encoding="utf-8")
     name, law = re.search(r"^```rust (\S+)\n(.*?)^```", text, flags=re.M | re.S).groups()  # type: ignore[union-attr]
     entry = re.search(r"add `(\w+::\w+,)` to `catalogue!`", text)[1]  # type: ignore[index]
-    line = re.search(r"in `effects.rs`: `(.*?),` says", text)[1]  # type: ignore[index]
+    line = re.search(r"of `effects.rs`: `(.*?),` says", text)[1]  # type: ignore[index]
+    return name, law, entry, line
+
+
+def main() -> None:
+    """Copy, follow the guide, test."""
+    name, law, entry, line = shown()
     kind = Path(name).stem
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "armrs"

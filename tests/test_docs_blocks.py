@@ -185,6 +185,9 @@ def test_the_effect_of_the_developer_guide_fits_the_catalogue() -> None:
         line for line in like.splitlines() if line.startswith("use ")
     ]
     assert shaped in (ROOT / of.removeprefix("of ")).read_text(encoding="utf-8")
+    name, law, entry, line = runpy.run_path(str(ROOT / "scripts" / "developer_guide.py"))["shown"]()
+    assert (name, law, entry) == ("crates/arm-core/src/effect/swirl.rs", shown, "swirl::Swirl,")
+    assert line.startswith('("swirl", ')
     for _, name, content in blocks(DOCS / "developer.md"):
         for path in re.findall(r"scripts/\w+\.(?:py|sh)", f"{name} {content}"):
             assert (ROOT / path).is_file(), path
