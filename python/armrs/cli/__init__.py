@@ -9,6 +9,7 @@ nothing otherwise.
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import os
 import sys
@@ -18,6 +19,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .. import interruptible
 from ..errors import ArmrsError, BadInput, BadInputs, one_line
 from ..io import files
 from . import fmu, interrupts
@@ -165,6 +167,11 @@ def run() -> None:
     files.sweep_scratch()
     status = main()
     interrupts.forget()
+    if interruptible.is_working():  # an interpreter that is taken down under a thread of the core may not end in order
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError):
+                stream.flush()
+        os._exit(status)
     sys.exit(status)
 
 

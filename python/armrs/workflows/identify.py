@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .. import _armrs, checks
+from .. import _armrs, checks, interruptible
 from .._armrs import Estimate as Estimate
 from .._armrs import Fit as Fit
 from .._armrs import Identification as Identification
@@ -359,7 +359,7 @@ def _result(dataset: Dataset, found: Identification, effects: list[Effect], foll
 
 def _identified(built: _armrs.Rig, settings: CoreSettings, dataset: Dataset) -> tuple[Identification, tuple[str, ...]]:
     """Return what the core identified, and a line where the measured motion had to take the place of the simulated one."""
-    found = _armrs.identify(built, [bridged(t) for t in dataset.trials], settings)
+    found = interruptible.call(_armrs.identify, built, [bridged(t) for t in dataset.trials], settings)
     error = found.not_simulated
     if error is None:
         return found, ()

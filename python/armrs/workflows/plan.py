@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _armrs, checks
+from .. import _armrs, checks, interruptible
 from .._armrs import Design as Design
 from .._armrs import DesignedMovement as DesignedMovement
 from .._armrs import Forecast as Forecast
@@ -258,7 +258,9 @@ def forecast(
         if movement.waypoints.shape[1] != model.n_joints:
             raise BadInput("waypoints", f"rows of {movement.waypoints.shape[1]} angles", f"rows of {model.n_joints}")
     try:
-        return asked.plan(movements, _armrs.forecast(asked.rig, asked.settings, instruments, (movements, asked.repeats)))
+        return asked.plan(
+            movements, interruptible.call(_armrs.forecast, asked.rig, asked.settings, instruments, (movements, asked.repeats))
+        )
     except BadInput as error:
         # Of several movements nobody says which it was.
         raise about(movements[0], error) if len(movements) == 1 else error from None
@@ -319,7 +321,7 @@ def plan(
         "evaluations": checks.whole("evaluations", evaluations, least=1, most=100_000),
         "seed": checks.whole("seed", seed, least=0, most=2**64 - 1),
     }
-    design = _armrs.design(asked.rig, asked.settings, instruments, limits, search)
+    design = interruptible.call(_armrs.design, asked.rig, asked.settings, instruments, limits, search)
     found = tuple(Movement(np.array(m.waypoints), speed=m.speed, acceleration=m.acceleration, shape="smooth") for m in design.movements)
     return replace(asked.plan(found, design.forecast), slowed=design.slowed)
 

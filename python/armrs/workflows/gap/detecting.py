@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ... import _armrs, checks
+from ... import _armrs, checks, interruptible
 from ..._armrs import Limit
 from ...catalogue import catalogue
 from ...errors import BadInput, Text
@@ -71,7 +71,7 @@ def detectable(
             columns = {name: getattr(read, name) for name in ("q", "force_on_arm", "robot_q")}
             trials.append(Trial(f"planned {number + 1}, {repeat}", f"planned {number + 1}", repeat, "fit", read.time, **columns))
     data = Dataset("planned", model, tuple(trials), force_on="arm", synthetic=True, tolerance=instruments.tolerance)
-    seen = _armrs.look(_armrs.Rig(model, model.all_effects), core_trials(data), core_settings(data, True, threads))
+    seen = interruptible.call(_armrs.look, _armrs.Rig(model, model.all_effects), core_trials(data), core_settings(data, True, threads))
     limits = [
         Limit(s.kind, s.joint, s.channel, next(iter(s.parameters)), s.smallest, s.unit, s.gain, s.price)
         for s in seen.suspects

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Callable, Sequence
 
-from ... import _armrs, checks
+from ... import _armrs, checks, interruptible
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
@@ -85,8 +85,8 @@ def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progres
     built = _armrs.Rig(dataset.model, dataset.model.all_effects)
     warnings = suspicion.examine(dataset, led)
     with naming_trials(dataset.trials):
-        suspicion.refuse_mislabelled(dataset, led, _armrs.play(built, columns, settings))
-        result = _armrs.find_gap(built, columns, settings, progress)
+        suspicion.refuse_mislabelled(dataset, led, interruptible.call(_armrs.play, built, columns, settings))
+        result = interruptible.call_with_progress(_armrs.find_gap, built, columns, settings, progress=progress)
 
     def lacking(version: str) -> list[maps.Discrepancy]:
         return maps.discrepancies(dataset, led, result.trials, version)

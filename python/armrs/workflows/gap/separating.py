@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ... import _armrs
+from ... import _armrs, interruptible
 from ..._armrs import Alternative, Missing, Separation
 from ...errors import ArmrsError, SimulationError
 from ...io.trial import Trial
@@ -81,7 +81,8 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
         return effect
     own, others = model.all_effects[there[-1]], [e for k, e in enumerate(model.all_effects) if k != there[-1]]
     try:
-        rows = _armrs.distances(
+        rows = interruptible.call(
+            _armrs.distances,
             _armrs.Rig(model, [*others, own]),
             core_trials(result.dataset),
             core_settings(result.dataset, True, threads),

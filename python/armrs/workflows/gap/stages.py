@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ... import _armrs, checks
+from ... import _armrs, checks, interruptible
 from ..._armrs import Absorbed, ChannelGap, Place, Suspect
 from ...custom_effects import OwnEffect
 from ...errors import BadInput, Text
@@ -139,7 +139,7 @@ def compare(dataset: Source, model: Model | None = None) -> Compared:
     data = _loaded(dataset, model)
     led = is_led(data)
     warnings = suspicion.examine(data, led)
-    plays = _armrs.play(_armrs.Rig(data.model), core_trials(data), core_settings(data, led, 1))
+    plays = interruptible.call(_armrs.play, _armrs.Rig(data.model), core_trials(data), core_settings(data, led, 1))
     suspicion.refuse_mislabelled(data, led, plays)
     found = maps.discrepancies(data, led, plays, "given")
     gap = dict(zip(channel_names(data, led), _armrs.sizes(plays, "given"), strict=True))
@@ -174,8 +174,8 @@ def calibrate(
     settings = core_settings(data, led, threads, [e.kind for e in effects])
     built, columns = _armrs.Rig(data.model, data.model.all_effects), core_trials(data)
     with naming_trials(data.trials):
-        suspicion.refuse_mislabelled(data, led, _armrs.play(built, columns, settings))
-        seen = _armrs.look(built, columns, settings, progress)
+        suspicion.refuse_mislabelled(data, led, interruptible.call(_armrs.play, built, columns, settings))
+        seen = interruptible.call_with_progress(_armrs.look, built, columns, settings, progress=progress)
     return Calibrated(seen, tuple(warnings), data)
 
 
