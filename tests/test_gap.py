@@ -56,15 +56,15 @@ def test_the_report_of_a_named_effect(viscous: armrs.GapFound, tmp_path: Path) -
         headings={
             "Missing from the model",
             "Each effect by itself",
-            "The gap on trials that were kept apart",
+            "The gap on test trials",
             "Where model and data disagree",
             "Evidence",
             "What was ruled out",
             "How to repeat",
         },
     )
-    assert verdict.startswith("Missing from the model is viscous damping in joint 2 (elbow), viscosity 0.402 N m s/rad (95 %: ")
-    assert verdict.count(". ") == 0 and "on held-out trials falls from" in verdict
+    assert verdict.startswith("Missing from the model is viscous damping in joint 2 (elbow), viscosity 0.402 N m s/rad (95 % interval ")
+    assert verdict.count(". ") == 0 and "on test trials falls from" in verdict
     assert unescaped(tmp_path / "gap.json", tmp_path) == []
 
 
@@ -130,7 +130,7 @@ def test_nothing_is_missing_where_nothing_is_hidden(tmp_path: Path, capsys: pyte
     assert 0 < limits["viscous", 2] < 0.4
     assert armrs.load_model(tmp_path / "out" / "amended.toml").n_joints == 2
     assert len(result["made_by"]["input_sha256"]) == 64
-    verdict = look(tmp_path / "out" / "report.html", figures=3, headings={"The gap on trials that were kept apart", "What was ruled out"})
+    verdict = look(tmp_path / "out" / "report.html", figures=3, headings={"The gap on test trials", "What was ruled out"})
     assert verdict.startswith("Nothing is missing")
 
 
@@ -141,8 +141,8 @@ def test_dry_friction_of_a_real_rig_is_named_and_nothing_is_called_noise_without
     result = json.loads((tmp_path / "gap.json").read_text(encoding="utf-8"))
     assert {(e["kind"] in ("coulomb", "load_friction"), e["joint"]) for e in result["effects"]} == {(True, 1), (True, 2)}
     out = capsys.readouterr().out
-    assert "Without repeats of a movement, whether what is left is noise cannot be tested." in out
-    assert "what is left is noise." not in out.replace("whether what is left is noise", "")
+    assert "Without repeats of a movement, it cannot be tested whether the remaining difference is noise." in out
+    assert "is noise." not in out.replace("whether the remaining difference is noise.", "")
 
 
 def changed(data: Dataset, **columns: object) -> Dataset:

@@ -9,9 +9,9 @@ import pytest
 
 from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
-from armrs.workflows.gap.headline import headline, still_open
+from armrs.workflows.gap.headline import amount, headline, still_open
 from armrs.workflows.gap.summary import marks, rivals
-from armrs.workflows.gap.words import gap, heading, intervals, left, missing, named, nearest, others, tie
+from armrs.workflows.gap.words import calibration, gap, heading, intervals, left, missing, named, nearest, others, tie
 
 
 def channel(before: float, calibrated: float, after: float, floor: float | None) -> dict[str, Any]:
@@ -45,8 +45,8 @@ DRY = effect("coulomb", 2, ("torque", 0.161, 0.006, "N m"))
 
 def test_a_named_effect_is_told_with_its_size_and_what_it_is_worth() -> None:
     assert headline(result("explained", DRY)) == (
-        "Missing from the model is Coulomb friction in joint 2 (elbow), torque 0.161 N m (95 %: 0.149 to 0.173): with it, the gap of the "
-        "contact force upward (Fz) on held-out trials falls from 2.4 N to 0.16 N, where repeats differ by 0.15 N."
+        "Missing from the model is Coulomb friction in joint 2 (elbow), torque 0.161 N m (95 % interval 0.149 to 0.173): with it, the "
+        "gap of the contact force upward (Fz) on test trials falls from 2.4 N to 0.16 N RMS; repeats differ by 0.15 N."
     )
 
 
@@ -63,10 +63,10 @@ def test_of_two_amplitudes_the_larger_one_is_told() -> None:
         )
     }
     assert headline(result("explained", heave)).startswith(
-        "Missing from the model is shoulder heave, z -0.0030 m (95 %: -0.0032 to -0.0028): with it, "
+        "Missing from the model is shoulder heave, z -0.0030 m (95 % interval -0.0032 to -0.0028): with it, "
     )
     heave |= {"summary": "first joint that heaves", "formula": "f", "p_value": 1e-20}
-    assert "z -0.0030 m (95 %: -0.0032 to -0.0028)" in named(result("explained", heave))[0]
+    assert "z -0.0030 m (95 % interval -0.0032 to -0.0028)" in named(result("explained", heave))[0]
 
 
 def test_an_open_gap_contradicts_no_sentence() -> None:
@@ -77,7 +77,7 @@ def test_an_open_gap_contradicts_no_sentence() -> None:
         assert still_open(told) == ["q3_rad", "Fz_N"]
         said = headline(told)
         assert "Nothing is missing" not in said and "falls from" not in said
-        assert "off by 0.88°, where repeats differ by 0.11°" in said
+        assert "off by 0.88° RMS; repeats differ by 0.11°" in said
         assert [row[-1] for row in gap(told).rows] == ["open", "open"]
         assert any("the angle of joint 3 (q3) is open on the test trials" in line for line in left(told))
 
@@ -95,7 +95,7 @@ def test_names_that_leave_the_gap_open_are_what_comes_nearest() -> None:
     told = result("unexplained", bare, gap={"Fz_N": channel(2.6, 2.31, 1.41, 0.1)})
     assert headline(told) == (
         "Something is missing that no effect of the catalogue explains; nearest to it is Coulomb friction in joint 2 (elbow), which does not "
-        "close the gap: on held-out trials the contact force upward (Fz) is still off by 1.4 N, where repeats differ by 0.1 N."
+        "close the gap: on test trials, the contact force upward (Fz) is still off by 1.4 N RMS; repeats differ by 0.1 N."
     )
     assert heading(told) == "What comes nearest to what is missing"
     # Nine tenths of the gap closed, or a gap that hardly was there: the names stand.
@@ -109,7 +109,7 @@ def test_what_the_result_calls_open_counts_with_its_place() -> None:
     listed = [{"channel": "q3_rad", "trial": "trials/fast_2.csv", "t_start": 3.14, "t_end": 4.6}]
     told = result("unexplained", DRY, open=listed)
     assert still_open(told) == ["q3_rad"]
-    assert headline(told).endswith("(q3) is still off by 0.11°, where repeats differ by 0.1° (trials/fast_2.csv, 3.1 to 4.6 s).")
+    assert headline(told).endswith("(q3) is still off by 0.11° RMS (widest in trials/fast_2.csv, 3.1 to 4.6 s); repeats differ by 0.1°.")
     assert "and something that no effect of the catalogue explains" in headline(told)
     # What it calls closed is closed, whatever the ratio: its test knows what the floor is uncertain by.
     assert still_open(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.3, 0.15)}, open=[])) == []
@@ -121,7 +121,7 @@ def test_a_joint_that_friction_holds_is_no_riddle() -> None:
     q3 = {"channel": "q3_rad", "trial": "trials/reach_5.csv", "start_s": 1.0, "end_s": 8.9}
     told = headline(result("unexplained", DRY, open=[q3], would_have_seen=hidden))
     assert (
-        ", and the laws in joint 3 (wrist), which friction holds nearly all the time, so that these movements cannot tell them: on held-out"
+        ", and the laws in joint 3 (wrist), which these movements cannot show because friction holds the joint nearly all the time: on test"
         in told
     )
     # A force is open beside it, or nothing holds the joint.
@@ -166,7 +166,7 @@ def test_many_effects_are_named_by_kind(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_nothing_is_claimed_that_was_not_tested() -> None:
-    assert headline(result("nothing_missing")).startswith("Nothing is missing that these data could show: on held-out trials")
+    assert headline(result("nothing_missing")).startswith("Nothing is missing that these data could show: on test trials")
     near, wider = ({"q2_rad": channel(0.003, last, last, 1e-3)} for last in (1.08e-3, 1.21e-3))
     assert headline(result("nothing_missing", gap=near)).endswith("no channel is off by more than about what repeats differ by.")
     assert headline(result("nothing_missing", gap=wider)).endswith("no channel is off by more than 1.3 times what repeats differ by.")
@@ -174,8 +174,8 @@ def test_nothing_is_claimed_that_was_not_tested() -> None:
     untested = {"q2_rad": dict.fromkeys(("before", "calibrated", "after", "floor"))}
     for kept in ({}, untested):
         assert headline(result("explained", DRY, gap=kept)).endswith("; there is no test trial to measure the gap on.")
-        assert "held-out" not in headline(result("nothing_missing", gap=kept))
-    assert headline(result("unexplained")).startswith("Something is missing that no effect of the catalogue explains: on held-out trials")
+        assert "test trials" not in headline(result("nothing_missing", gap=kept))
+    assert headline(result("unexplained")).startswith("Something is missing that no effect of the catalogue explains: on test trials")
 
 
 @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_where_nothing_is_named_the_table_shows_what_the_headline_says() -> None
 def test_no_more_than_all_of_a_gap_is_closed() -> None:
     """Both the gap that is left and what repeats differ by are estimates: the first may be the smaller one."""
     table = gap(result("explained", DRY, gap={"Fz_N": channel(3.0, 2.4, 0.10, 0.15)}))
-    assert table.rows[0][table.head.index("gap closed")] == "100%"
+    assert table.rows[0][table.head.index("gap closed")] == "100 %"
     assert ChannelGap(3.0, 2.4, 0.10, 0.15).closed == 1.0
     assert ChannelGap(3.0, 2.4, 1.275, 0.15).closed == pytest.approx(0.5)
 
@@ -237,7 +237,7 @@ def test_the_rule_of_the_verdict(change: dict[str, Any], verdict: str) -> None:
 def test_an_open_torque_is_told_with_its_unit() -> None:
     """`0.027 Nm` stood beside `N m` everywhere else."""
     told = result("unexplained", DRY, gap={"tau2_Nm": channel(0.5, 0.13, 0.027, 0.018)})
-    assert any("off by 0.027 N m, where repeats" in line for line in left(told)) and "0.027 N m, where" in headline(told)
+    assert any("off by 0.027 N m RMS; repeats" in line for line in left(told)) and "0.027 N m RMS; repeats" in headline(told)
 
 
 def test_what_has_no_interval_has_no_columns_for_it() -> None:
@@ -245,11 +245,13 @@ def test_what_has_no_interval_has_no_columns_for_it() -> None:
     bare = {**DRY, "share": 0.5, "parameters": {"torque": {"value": 0.161, "std": None, "interval": None, "unit": "N m"}}}
     table = missing(result("unexplained", bare))
     assert list(table.head) == ["effect", "at", "share", "parameter", "value", "unit"]
-    assert list(table.rows[0]) == ["coulomb", 2, "50%", "torque", "0.161", "N m"]
+    assert list(table.rows[0]) == ["coulomb", 2, "50 %", "torque", "0.161", "N m"]
     assert intervals(result("unexplained", bare)).startswith("No intervals are given")
     sized = {**DRY, "share": 0.5, "parameters": DRY["parameters"]}
     assert "95 % interval" in missing(result("explained", sized)).head
-    assert intervals(result("explained", sized)) == "An interval holds if the structure of the model is right."
+    assert (
+        intervals(result("explained", sized)) == "± is one standard deviation. Interval and ± hold if the structure of the model is right."
+    )
 
 
 def test_effects_stand_joint_by_joint_as_on_the_page_for_a_clinician() -> None:
@@ -288,10 +290,31 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     # What is 13 standard deviations apart already cannot be told apart only because a law may miss as much.
     asked = {"separating_movement": "lead the elbow alone", "separation": {"now": 13.0, "then": 40.0}}
     lines = others(result("explained", {**DRY, "alternatives": [{**far, **asked}]}))
-    assert lines[1].endswith("40 standard deviations apart (now 13, which the law that is not exact may make).")
-    assert "or by what a law that is not exact may miss: on these" in tie(result("explained", {**DRY, "alternatives": [far]}))
+    assert lines[1].endswith("40 standard deviations apart (now 13, which the error of an inexact law may cause).")
+    assert "or by no more than an inexact law may miss: on these" in tie(result("explained", {**DRY, "alternatives": [far]}))
     assert "log-likelihood: on these" in tie(result("explained", {**DRY, "alternatives": [rival]}))
     for worse, said in ((-729.0, "(why, by 729 units more)."), (-3.0, "(why)."), (0.05, "(why).")):
         other = effect("viscous", 2, why="why", worse=worse)
         [line] = others(result("explained", {**DRY, "alternatives": [other]}))
         assert line.endswith(said)
+
+
+def test_a_page_has_angles_in_degrees_alone() -> None:
+    """The headline told an offset in radians and the gap of the same joint in degrees."""
+    offset = effect("angle_offset", 2, ("offset", 0.02, 0.001, "rad"), share=0.5)
+    told = result("explained", offset)
+    assert "offset 1.15° (95 % interval 1.03 to 1.26°)" in headline(told)
+    assert [row[4:] for row in missing(told).rows] == [["1.146", "0.057", "1.031 … 1.261", "°"]]
+    absorbed = {"name": "angle offset of joint 1", "value": 0.01, "promised": 0.005, "unit": "rad"}
+    assert calibration({"calibration": [absorbed]}).rows == [["angle offset of joint 1", "+0.573", "± 0.286", "°", "beyond the prior"]]
+
+
+def test_the_headline_names_effects_in_the_order_of_the_table() -> None:
+    size = ("torque", 0.161, 0.006, "N m")
+    assert headline(result("explained", effect("coulomb", 2, size), effect("coulomb", 1, size))).startswith(
+        "Missing from the model are Coulomb friction in joint 1 (shoulder), torque 0.161 N m"
+    )
+
+
+def test_a_gap_beyond_a_hundred_has_no_exponent() -> None:
+    assert amount("Fz_N", 123.0) == "120 N"

@@ -149,6 +149,15 @@ def unit(text: str) -> str:
     return _UNITS.get(text, text.replace("^2", "²"))
 
 
+def read_in(held_in: str) -> tuple[float, str]:
+    """Return the factor to the unit in which people read what is held in another, and that unit: angles in degrees.
+
+    >>> read_in("Nm"), read_in("rad")[1]
+    ((1.0, 'N m'), '°')
+    """
+    return (math.degrees(1.0), "°") if held_in == "rad" else (1.0, unit(held_in))
+
+
 def number(value: float | None, std: float | None) -> str:
     """Write a value with the digits that its standard deviation leaves meaningful, at least two."""
     if value is None:
@@ -325,7 +334,7 @@ def predictions(data: Mapping[str, Any]) -> Table:
 
 def percent(share: float | None) -> str:
     """Write a share with two digits; what has none is unknown."""
-    return "unknown" if share is None or not math.isfinite(share) else f"{100 * share:.2g} %"
+    return "unknown" if share is None or not math.isfinite(share) else f"{digits(100 * share, 2)} %"
 
 
 def _known(value: float | None) -> str:
@@ -429,6 +438,6 @@ def smallest_effects(would_show: Sequence[Mapping[str, Any]]) -> Table:
         key = (w["kind"], w["parameter"], w["unit"])
         cells = rows.setdefault(key, [None] * (most + 2))
         at = w["joint"] - 1 if w["joint"] else most + ({"Fy": 0, "Fz": 1}.get(w["channel"], 0) if w["channel"] else 0)
-        cells[at] = "no size" if w["at_least"] is None else digits(w["at_least"], 2)
+        cells[at] = "no size" if w["at_least"] is None else digits(read_in(w["unit"])[0] * w["at_least"], 2)
     head = ["effect", "parameter", "unit", *(f"joint {j + 1}" for j in range(most)), "whole arm or Fy", "Fz"]
-    return Table(head, [[kind, parameter, unit(held_in), *cells] for (kind, parameter, held_in), cells in rows.items()], 3)
+    return Table(head, [[kind, parameter, read_in(held_in)[1], *cells] for (kind, parameter, held_in), cells in rows.items()], 3)

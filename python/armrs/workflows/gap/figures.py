@@ -82,7 +82,7 @@ def _before_and_after(result: GapFound) -> Drawn:
     _time_legend(figure, steps_of(result))
     text = (
         f"The test trial with the largest gap, {trial.file}. Above, what was measured (broad, grey) and the closed-loop simulation of the "
-        "models; below, simulated less measured."
+        "models; below, simulated minus measured."
     )
     return Drawn("before-and-after", "Simulated against measured, before and after", text, figure, "gap")
 
@@ -114,7 +114,7 @@ def missing_torque(joints: Sequence[str], found: Mapping[str, Sequence[maps.Disc
         for row, (version, one) in enumerate(zip(versions, own, strict=True)):
             ax = axes[row, j]
             look: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
-            edges = np.degrees(one.angle), one.speed
+            edges = np.degrees(one.angle), np.degrees(one.speed)
             ax.set_facecolor(plotting.FAINT)
             # Cells that were visited are at least white.
             ax.pcolormesh(*edges, np.where(np.isfinite(one.torque), 0.0, np.nan), cmap="Greys", vmin=0.0, vmax=1.0)
@@ -123,16 +123,16 @@ def missing_torque(joints: Sequence[str], found: Mapping[str, Sequence[maps.Disc
             ax.axhline(0.0, color=plotting.INK, lw=0.6)
             ax.grid(visible=False)
             ax.set_title(f"{name}, {STEPS[version][1]}")
-            ax.set_ylabel("speed [rad/s]" if j == 0 else "")
+            ax.set_ylabel("joint speed [°/s]" if j == 0 else "")
         axes[-1, j].set_xlabel("joint angle [°]")
         bar = figure.colorbar(mesh, ax=list(axes[:, j]), location="right", shrink=0.9, pad=0.02, extend="both")
         bar.set_label("missing torque [N m]")
         bar.outline.set_visible(False)
     text = (
         "Mean torque over all fit trials by which a joint resists a growing angle more (red) or less (blue) than the model says, by "
-        "angle and speed; above the line the angle grows. Two halves of opposite colour are friction, colours that change from left to"
-        " right are a spring or a weight, colours that deepen away from the line grow with speed. Pale cells are not clear beside what"
-        " trials differ by, grey ones were not visited."
+        "angle and speed; above the line the angle grows. Two halves of opposite colour are friction, a change of colour from left to"
+        " right is a spring or a weight, and colours that deepen away from the line are a resistance that grows with speed. Pale cells do"
+        " not stand out from the scatter between trials; grey cells were not visited."
     )
     return Drawn("maps", "Where the torque is missing", text, figure, "where")
 
@@ -202,7 +202,7 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
         start = "Right, w" if seen.torque is not None else "W"
         role = "test " if any(t.role == "test" for t in result.dataset.trials) else ""
         which = "the trial in which it was" if effect.trial is not None else f"the {role}trial in which it changes most"
-        text += f"{start}hat it changes in {seen.trial}, {which}: simulated with it less without it."
+        text += f"{start}hat it changes in {seen.trial}, {which}: simulated with it minus without it."
     if not panels:
         axes[0].set_axis_off()
         axes[0].text(0.0, 0.5, "not drawn: it cannot be simulated by itself")
@@ -216,7 +216,7 @@ def _name_of(number: int, effect: Missing) -> str:
 
 
 def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:
-    factor, unit = (180.0 / np.pi, "°") if seen.against == "angle" else (1.0, "rad/s" if seen.against == "speed" else "s")
+    factor, unit = {"angle": (180.0 / np.pi, "°"), "speed": (180.0 / np.pi, "°/s")}.get(seen.against, (1.0, "s"))
     x = seen.x * factor
     there = np.isfinite(seen.data)
     grey: dict[str, Any] = {"ms": 4, "color": plotting.GREY, "ecolor": plotting.SILVER, "elinewidth": 3}

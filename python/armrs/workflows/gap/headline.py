@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...catalogue import catalogue, title
-from ...report.tables import number, unit
+from ...report.tables import digits, number, read_in
 
 OPEN = 1.5
 """A channel is open as a whole where its gap exceeds so many times its floor."""
@@ -55,6 +55,11 @@ def effect_name(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
     return place_of(effect["kind"], effect["joint"], effect["channel"], joints)
 
 
+def by_joint(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the named effects joint by joint, as the page for a clinician has them; behind them those of no joint."""
+    return sorted(result["effects"], key=lambda effect: effect["joint"] or math.inf)
+
+
 def joined(names: Sequence[str], last: str = "and") -> str:
     """Return `a, b and c`."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}" if names else ""
@@ -100,16 +105,16 @@ def only_near(result: Mapping[str, Any]) -> bool:
 
 def headline(result: Mapping[str, Any]) -> str:
     """Return the answer in one sentence: what the model lacks, and what that does to the gap on trials that were kept apart."""
-    joints, effects = result["data"]["joints"], result["effects"]
+    joints, effects = result["data"]["joints"], by_joint(result)
     opened, unexplained = still_open(result), result["verdict"] == "unexplained"
     tested = result["lack_of_fit"]["amended"]["z"] is not None
     held_out = any(g["calibrated"] for g in result["gap"].values())
     if not effects and not unexplained and not opened:
         if not tested:
-            return "No missing effect was found; without repeats, whether what is left is noise cannot be tested."
+            return "No missing effect was found; without repeats, it cannot be tested whether the remaining difference is noise."
         if not held_out:
             return f"Nothing is missing that these data could show; {_NO_TEST}."
-        return f"Nothing is missing that these data could show: on held-out trials no channel is off by more than {_near(result['gap'])}."
+        return f"Nothing is missing that these data could show: on test trials, no channel is off by more than {_near(result['gap'])}."
     if only_near(result):
         are, do = ("is", "does") if len(effects) == 1 else ("are", "do")
         lacks = f"Something is missing that no effect of the catalogue explains; nearest to it {are} {_names(effects, joints)}, "
@@ -132,7 +137,8 @@ def _beyond(result: Mapping[str, Any], opened: Sequence[str]) -> str:
         return _NAMELESS
     one = place_of("the laws", stuck[0], None, result["data"]["joints"])
     where = one if len(stuck) == 1 else f"the laws in joints {joined([str(j) for j in stuck])}"
-    return f"{where}, which friction holds nearly all the time, so that these movements cannot tell them"
+    held_joints = "the joint" if len(stuck) == 1 else "these joints"
+    return f"{where}, which these movements cannot show because friction holds {held_joints} nearly all the time"
 
 
 def _near(gap: Mapping[str, Mapping[str, Any]]) -> str:
@@ -203,12 +209,14 @@ def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
 
 def with_interval(parameter: str, value: Mapping[str, Any]) -> str:
     """Return a value with its name and unit, and the ends of its interval where it has one, to one digit of its standard deviation."""
-    digits = value["std"] and 10.0 * value["std"]
-    text = f"{parameter} {number(value['value'], digits)} {unit(value['unit'])}".rstrip()
-    if digits is None or not value.get("interval"):
+    factor, held_in = read_in(value["unit"])
+    coarse = value["std"] and 10.0 * factor * value["std"]
+    beside = "" if held_in == "°" else " "
+    text = f"{parameter} {number(factor * value['value'], coarse)}{beside}{held_in}".rstrip()
+    if coarse is None or not value.get("interval"):
         return text
-    low, high = (number(end, digits) for end in value["interval"])
-    return f"{text} (95 %: {low} to {high})"
+    low, high = (number(factor * end, coarse) for end in value["interval"])
+    return f"{text} (95 % interval {low} to {high}{'°' if held_in == '°' else ''})"
 
 
 def largest(parameters: Mapping[str, Mapping[str, Any]]) -> str | None:
@@ -225,22 +233,21 @@ def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
     name = shown[0] if shown else max(gap, key=lambda n: _times(gap[n], "calibrated"))
     channel = gap[name]
     quantity = spoken(name.rsplit("_", 1)[0])
-    floor = f", where repeats differ by {amount(name, channel['floor'])}" if channel["floor"] else ""
-    floor += place(result, name) if shown else ""
+    floor = f"; repeats differ by {amount(name, channel['floor'])}" if channel["floor"] else ""
     value = left(channel)
     if shown or channel["after"] is None or not any(not e.get("trial") for e in result["effects"]):
-        return f"on held-out trials {quantity} is {'still ' if shown and result['effects'] else ''}off by {amount(name, value)}{floor}"
+        still = "still " if shown and result["effects"] else ""
+        return f"on test trials, {quantity} is {still}off by {amount(name, value)} RMS{place(result, name) if shown else ''}{floor}"
     them = "it" if len(result["effects"]) == 1 else "them"
     return (
-        f"with {them}, the gap of {quantity} on held-out trials falls from {amount(name, channel['calibrated'])} to "
-        f"{amount(name, value)}{floor}"
+        f"with {them}, the gap of {quantity} on test trials falls from {amount(name, channel['calibrated'])} to "
+        f"{amount(name, value)} RMS{floor}"
     )
 
 
 def shown_in(name: str) -> tuple[float, str]:
     """Return in which unit people read a channel, and how many of it are one of the unit in its name: angles in degrees."""
-    held_in = name.rsplit("_", 1)[1]
-    return (math.degrees(1.0), "°") if held_in == "rad" else (1.0, unit(held_in))
+    return read_in(name.rsplit("_", 1)[1])
 
 
 def channel_label(name: str) -> tuple[str, float]:
@@ -260,7 +267,7 @@ def amount(name: str, value: float | None) -> str:
     ('0.16 N', '0.57°')
     """
     factor, called = shown_in(name)
-    number = "–" if value is None else f"{factor * value:.2g}"
+    number = "–" if value is None else digits(factor * value, 2)
     return f"{number}{'' if called == '°' else ' '}{called}"
 
 
@@ -275,12 +282,12 @@ def spoken(name: str) -> str:
 
 
 def place(result: Mapping[str, Any], name: str) -> str:
-    """Return where a channel is open, where the result says that: ` (trials/fast_2.csv, 3.1 to 4.6 s)`."""
+    """Return where the gap of an open channel is widest, if the result says that: ` (widest in trials/fast_2.csv, 3.1 to 4.6 s)`."""
     entry = next((o for o in result.get("open") or [] if o["channel"] == name), None)
     if entry is None or not entry.get("trial"):
         return ""
     span = f", {entry['t_start']:.1f} to {entry['t_end']:.1f} s" if entry.get("t_start") is not None else ""
-    return f" ({entry['trial']}{span})"
+    return f" (widest in {entry['trial']}{span})"
 
 
 def _times(channel: Mapping[str, Any], step: str) -> float:

@@ -12,7 +12,7 @@ from ...catalogue import Kind, catalogue, title
 from ...report import plotting
 from ...report.figures import Drawn
 from ...report.sketch import sketch
-from ...report.tables import number, spread, unit
+from ...report.tables import number, read_in, spread
 from .found import GapFound
 from .headline import largest, left, only_near, place_of, shown_in, still_open
 
@@ -44,7 +44,7 @@ def summary(result: GapFound) -> Drawn:
     if gaps:
         shrinking(result, gaps, right)
         one = "what repeats differ by" if all(g.floor for g in gaps.values()) else "what the calibrated model leaves"
-        text += f" Right, simulated less measured on trials that were kept apart, in units of {one}."
+        text += f" Right, the root mean square of simulated minus measured on test trials, in units of {one}."
         if result.effects:
             text += " The step from calibrated to the named effects is due to the named effects alone."
     else:
@@ -99,7 +99,8 @@ def _words(effect: Missing) -> str:
     name = largest({n: {"value": v.value, "std": v.std, "unit": v.unit} for n, v in effect.parameters.items()})
     value = None if name is None else effect.parameters[name]
     if value is not None and value.std is not None:
-        text += f" {number(value.value, value.std)} ± {spread(value.std)} {unit(value.unit)}".rstrip()
+        factor, held_in = read_in(value.unit)
+        text += f" {number(factor * value.value, factor * value.std)} ± {spread(factor * value.std)} {held_in}".rstrip()
     return text + (" (one trial)" if effect.trial else "")
 
 
@@ -149,7 +150,7 @@ def shrinking(result: GapFound, gaps: Mapping[str, ChannelGap], ax: Axes) -> Non
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
     ax.set_xlabel(
-        "gap on held-out trials, times what repeats differ by" if floors else "gap on held-out trials, times that of the calibrated model"
+        "gap on test trials, times what repeats differ by" if floors else "gap on test trials, times that of the calibrated model"
     )
     _legend(ax, steps, floors=floors)
 

@@ -65,7 +65,7 @@ def _few_trials(dataset: Dataset, led: bool) -> list[str]:
     elif len({t.configuration for t in fit}) == len(fit):
         lines.append("no movement was repeated: what is noise and what is missing cannot be told apart; names after the first are guesses")
     if not dataset.test_trials:
-        lines.append('no trial with role = "test": the gap cannot be measured on data that were kept apart')
+        lines.append('no trial with role = "test": the gap cannot be measured on data that no fit has seen')
     return lines
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ..._armrs import MISFIT
+from ...report import tables
 from ...report import words as common
-from ...report.tables import Table, digits, number, smallest_effects, spread, unit
+from ...report.tables import Table, digits, number, smallest_effects, spread
 from . import headline
 from .headline import effect_name, joined
 
@@ -28,25 +29,21 @@ def size(effect: Mapping[str, Any]) -> str:
 
 
 def chance(effect: Mapping[str, Any]) -> str:
-    """Return how probable it is that an effect gains so much by chance."""
+    """Return how probable it is that an effect improves the fit so much by chance."""
     p = effect["p_value"]
     if p < 1e-6:
-        return "with a probability below one in a million"
-    return f"with a probability of {p:.0%}" if p >= 0.01 else f"with a probability of one in {number(1.0 / p, 0.1 / p)}"
+        return "below one in a million"
+    return tables.percent(p) if p >= 0.01 else f"one in {number(1.0 / p, 0.1 / p)}"
 
 
 def named(result: Mapping[str, Any]) -> list[str]:
     """Return the named effects, a line each: what it is, its formula, its size, and how likely it is by chance."""
     joints = result["data"]["joints"]
     return [
-        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}; such a gain arises by chance {chance(e)}."
-        for e in _by_joint(result)
+        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}. "
+        f"Probability of such an improvement of the fit by chance: {chance(e)}."
+        for e in headline.by_joint(result)
     ]
-
-
-def _by_joint(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the named effects joint by joint, as the page for a clinician has them; behind them those of no joint."""
-    return sorted(result["effects"], key=lambda effect: effect["joint"] or math.inf)
 
 
 def is_led(result: Mapping[str, Any]) -> bool:
@@ -54,7 +51,10 @@ def is_led(result: Mapping[str, Any]) -> bool:
     return any(name.endswith("_N") for name in result["gap"])
 
 
-FORMULAS = "In formulas R is the torque with which a joint resists, q is its angle and q̇ its speed."
+FORMULAS = (
+    "In formulas, R is the torque with which a joint resists, q its angle and q̇ its speed. Tables name effects as a model file does; "
+    "angles are in degrees here and in radians there."
+)
 
 
 def symbols(result: Mapping[str, Any]) -> str:
@@ -81,7 +81,7 @@ def symbols(result: Mapping[str, Any]) -> str:
     return f"{sentence}." if sentence else ""
 
 
-_UNTESTED = "Without repeats of a movement, whether what is left is noise cannot be tested."
+_UNTESTED = "Without repeats of a movement, it cannot be tested whether the remaining difference is noise."
 
 
 def others(result: Mapping[str, Any]) -> list[str]:
@@ -102,7 +102,7 @@ def others(result: Mapping[str, Any]) -> list[str]:
 def tie(result: Mapping[str, Any]) -> str:
     """Return by how much alternatives may explain the data less and still not be told apart."""
     worse = any((a.get("worse") or 0.0) > _BETTER for effect in result["effects"] for a in effect["alternatives"])
-    beyond = ", or by what a law that is not exact may miss" if worse else ""
+    beyond = ", or by no more than an inexact law may miss" if worse else ""
     return (
         f"These explain the data as well, or less by up to {_BETTER:.0f} units of twice the log-likelihood{beyond}: on these movements "
         "they cannot be told apart."
@@ -116,7 +116,7 @@ def _separating(alternative: Mapping[str, Any]) -> str:
         return ""
     now, then = (digits(separation[key], 2) for key in ("now", "then"))
     if (alternative.get("worse") or 0.0) > _BETTER:
-        now += ", which the law that is not exact may make"
+        now += ", which the error of an inexact law may cause"
     best = alternative["separating_movement"]
     if separation["then"] < _TELLS:
         best = f"no movement that was tried separates them clearly. The best: {best}"
@@ -139,20 +139,20 @@ def apart(result: Mapping[str, Any]) -> list[str]:
     for effect in result["effects"]:
         if there := common.disturbance(effect):
             trial, start, end = there
-            lines.append(f"{effect_name(effect)} in {trial}, {start:.2f} to {end:.2f} s ({size(effect)}): left out of what is fitted.")
+            lines.append(f"{effect_name(effect)} in {trial}, {start:.2f} to {end:.2f} s ({size(effect)}): left out of the fit.")
     return lines
 
 
 def left(result: Mapping[str, Any]) -> list[str]:
     """Return what is left beyond noise, in words."""
     lines = []
-    for which, words in (("calibrated", "The calibrated model"), ("amended", "The model with the named effects")):
+    for which, words in (("calibrated", "Calibrated model"), ("amended", "Model with the named effects")):
         lack = result["lack_of_fit"][which]
         if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
             verdict = f"{'more' if lack['z'] >= MISFIT else 'no more'} than noise explains"
             lines.append(
-                f"{words} leaves residuals on the fit trials that repeats share, with {digits(lack['ratio'])} times the variance between "
-                f"repeats: {verdict} ({_deviations(lack['z'])} standard deviations, limit {MISFIT:g})."
+                f"{words}, fit trials: the part of the residuals that repeats share has {digits(lack['ratio'])} times the variance of the "
+                f"part that differs between them. This is {verdict} ({_deviations(lack['z'])} standard deviations; limit {MISFIT:g})."
             )
     if not lines:
         lines.append(_UNTESTED)
@@ -160,11 +160,13 @@ def left(result: Mapping[str, Any]) -> list[str]:
         channel = result["gap"][name]
         off, floor = (headline.amount(name, value) for value in (headline.left(channel), channel["floor"]))
         lines.append(
-            f"{headline.spoken(name.rsplit('_', 1)[0])} is open on the test trials: off by {off}, where repeats differ by {floor}"
-            f"{headline.place(result, name)}."
+            f"{headline.spoken(name.rsplit('_', 1)[0])} is open on the test trials: off by {off} RMS{headline.place(result, name)}; "
+            f"repeats differ by {floor}."
         )
     if result["unexplained"]["share"]:
-        lines.append(f"Of the calibrated model's residual beyond noise on the fit trials, {result['unexplained']['share']:.1%} remains.")
+        lines.append(
+            f"Of the calibrated model's residual beyond noise on the fit trials, {tables.percent(result['unexplained']['share'])} remains."
+        )
     if result["unexplained"]["looks_like"]:
         looks = result["unexplained"]["looks_like"]
         lines.append(f"{looks[0].upper()}{looks[1:]}.")
@@ -182,7 +184,7 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     common.show(heading(result), missing(result))
     for line in (*others(result), *apart(result)):
         print(line)
-    common.show("Gap on the test trials, root mean square of simulated less measured", gap(result))
+    common.show("Gap on the test trials: root mean square of simulated minus measured", gap(result))
     if result["gap"]:
         print(f"{symbols(result)}\n")
     common.show("Where the calibrated model and the data disagree most", where(result))
@@ -203,14 +205,13 @@ def quick(result: Mapping[str, Any]) -> None:
     elif len(worth) == 1:
         said = f"{effect_name(worth[0])} may be missing"
     else:
-        said = f"{effect_name(worth[0])} explains most of {len(worth)} that may be missing, and several of them may be one"
-    noise = (
-        ""
-        if z is None or z != z
-        else f"; the calibrated model leaves {'more than' if z >= MISFIT else 'what is'} noise ({_deviations(z)} standard deviations)"
-    )
+        said = f"{len(worth)} effects may be missing, and several of them may be one; {effect_name(worth[0])} explains most"
+    noise = ""
+    if z is not None and not math.isnan(z):
+        more = "more" if z >= MISFIT else "no more"
+        noise = f"; the calibrated model leaves {more} than noise ({_deviations(z)} standard deviations; limit {MISFIT:g})"
     print(f"{common.name(result)}{label}, a first look: {said}{noise}.\n")
-    common.show("Gap on the test trials, root mean square of simulated less measured", gap({**result, "effects": []}))
+    common.show("Gap on the test trials: root mean square of simulated minus measured", gap({**result, "effects": []}))
     if result["gap"]:
         print(f"{symbols(result)}\n")
     common.show("What each would explain alone, to first order", suspects(result))
@@ -222,8 +223,9 @@ def suspects(data: Mapping[str, Any], most: int = 10) -> Table:
     """Return the effects that would explain most, alone and to first order."""
     rows = []
     for s in data["suspects"][:most]:
-        sizes = ", ".join(f"{name} {value:.3g}" for name, value in s["parameters"].items())
-        rows.append([s["kind"], s["joint"] or s["channel"], f"{sizes} {unit(s['unit'])}".rstrip(), f"{s['gain']:.3g}", f"{s['price']:.3g}"])
+        factor, held_in = tables.read_in(s["unit"])
+        sizes = ", ".join(f"{name} {factor * value:.3g}" for name, value in s["parameters"].items())
+        rows.append([s["kind"], s["joint"] or s["channel"], f"{sizes} {held_in}".rstrip(), f"{s['gain']:.3g}", f"{s['price']:.3g}"])
     return Table(["effect", "at", "size", "gain", "gain needed"], rows, 3)
 
 
@@ -236,19 +238,19 @@ def missing(data: Mapping[str, Any]) -> Table:
     """Return the named effects with their estimates."""
     rows: list[list[object]] = []
     repeated = any(effect.get("without") is not None for effect in data["effects"])
-    for effect in _by_joint(data):
+    for effect in headline.by_joint(data):
         place = effect["joint"] or effect["channel"]
-        alone = f"{effect['share']:.0%}" if effect["share"] > 0.005 else "< 1 %"
+        alone = f"{100 * effect['share']:.0f} %" if effect["share"] > 0.005 else "< 1 %"
         if repeated:
             without = effect.get("without")
             alone = "–" if without is None else digits(without, 2)
         fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
         for k, (name, value) in enumerate((fitted or effect["parameters"]).items()):
             head = [effect["kind"], place, alone] if k == 0 else ["", "", ""]
-            ends = None
-            if value["std"] is not None:
-                ends = " … ".join(number(end, value["std"]) for end in value["interval"])
-            rows.append([*head, name, number(value["value"], value["std"]), spread(value["std"]), ends, unit(value["unit"])])
+            factor, held_in = tables.read_in(value["unit"])
+            std = value["std"] and factor * value["std"]
+            ends = None if std is None else " … ".join(number(factor * end, std) for end in value["interval"])
+            rows.append([*head, name, number(factor * value["value"], std), spread(std), ends, held_in])
     head = ["effect", "at", "off without it" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"]
     if all(row[6] is None for row in rows):  # nothing has an interval: there are no columns for it
         head, rows = [*head[:5], head[7]], [[*row[:5], row[7]] for row in rows]
@@ -258,20 +260,20 @@ def missing(data: Mapping[str, Any]) -> Table:
 def intervals(data: Mapping[str, Any]) -> str:
     """Return under which condition the intervals hold, or why there are none."""
     if data["verdict"] == "unexplained":
-        left = "something is left that no effect explains"
-        return f"No intervals are given: they would suppose that the structure of the model is right, and {left}."
-    return "An interval holds if the structure of the model is right."
+        return (
+            "No intervals are given: they assume that the structure of the model is right, but something is left that no effect explains."
+        )
+    return "± is one standard deviation. Interval and ± hold if the structure of the model is right."
 
 
 def worth(data: Mapping[str, Any]) -> str:
     """Return what the third column of `missing` says."""
     if all(effect.get("without") is None for effect in data["effects"]):
-        return "The share is what would be lost of all that is explained if this one effect were left out and everything else refitted."
+        return "Share: the part of all that is explained which would be lost if this one effect were left out and everything else refitted."
     with_all = data["lack_of_fit"]["amended"]["ratio"] ** 0.5
     return (
-        "Off without it: how far the model would be off if this one effect were left out and everything else refitted, in root mean "
-        f"square and in units of what repeats differ by. With every effect it is off by {digits(with_all, 2)}. Disturbances of one "
-        "trial have no such number."
+        "Off without it: RMS residual if this one effect were left out and everything else refitted, in units of what repeats differ by. "
+        f"With every effect it is {digits(with_all, 2)}. Disturbances of one trial have no such number."
     )
 
 
@@ -295,7 +297,7 @@ def gap(data: Mapping[str, Any]) -> Table:
             [
                 label,
                 *values,
-                *([None if share is None else f"{share:.0%}"] if named else []),
+                *([None if share is None else f"{100 * share:.0f} %"] if named else []),
                 "open" if name in opened else None,
             ]
         )
@@ -335,10 +337,11 @@ def nearest(data: Mapping[str, Any], most: int = 8) -> Table:
 
 def calibration(data: Mapping[str, Any]) -> Table:
     """Return what the calibration absorbed, beside what was promised."""
-    rows = [
-        [a["name"], f"{a['value']:+.3g}", f"± {a['promised']:.3g}", unit(a["unit"]), "beyond" if abs(a["value"]) > a["promised"] else None]
-        for a in data["calibration"]
-    ]
+    rows = []
+    for a in data["calibration"]:
+        factor, held_in = tables.read_in(a["unit"])
+        note = "beyond the prior" if abs(a["value"]) > a["promised"] else None
+        rows.append([a["name"], f"{factor * a['value']:+.3g}", f"± {factor * a['promised']:.3g}", held_in, note])
     beyond = any(row[-1] for row in rows)
-    head = ["what", "refitted by", "known beforehand to (2 σ)", "unit", "but"]
+    head = ["quantity", "refitted by", "prior (2 σ)", "unit", "note"]
     return Table(head if beyond else head[:-1], rows if beyond else [row[:-1] for row in rows], 1)
