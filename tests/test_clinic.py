@@ -103,10 +103,10 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
     text = clinic.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html").read_text(encoding="utf-8")
     assert text.count("Stiffness [N m per 10°]") == 1 and ">0.314<" in text
     assert (
-        "The table has the values of armrs identify. The page of gap fits only what the recordings ask for, and beside it everything else "
+        "The table has the values of armrs identify. The page of gap fits only what the recordings ask for, together with everything else "
         "that it found, and states shoulder, stiffness 0.436 (0.419 to 0.454)."
     ) in text
-    assert "shoulder: stiffness differs between the analyses by more than both are uncertain." in text
+    assert "shoulder: stiffness differs between the analyses by more than the uncertainty of both." in text
     assert "resting angle differs" not in text
 
 
@@ -119,6 +119,7 @@ def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic.Norm
         "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",
         session_changes.SURE,
         "No clear change: shoulder (friction).",
+        session_changes.EITHER_WAY,
     ]
     assert clinic.words_of(lines[2])[5] == "no clear change: +0.010 ± 0.039"
     assert session_changes.said(clinic.lines_of(result(history=[]))) == []
@@ -204,13 +205,13 @@ def test_intervals_claim_no_more_than_holds(tmp_path: Path) -> None:
     rubs = [estimate("coulomb", "torque", 1, 0.2, 0.03)]
     for name, changes, said in (
         ("sound", {}, "spring with resistance and friction.<"),
-        ("rubs", {"parameters": rubs}, "too narrow: a joint rubs and may stick"),
+        ("rubs", {"parameters": rubs}, "too narrow: a joint has friction and may stick"),
         (
             "poor",
             {"warnings": ["the residual of joint 2 is 28% of the variation of its torque"]},
             "too narrow: the analysis does not describe",
         ),
-        ("noisy", {"parameters": [{**e, "caveat": "noise"} for e in rubs]}, "a large part of the speeds is noise; a joint rubs"),
+        ("noisy", {"parameters": [{**e, "caveat": "noise"} for e in rubs]}, "a large part of the speeds is noise; a joint has friction"),
     ):
         source = tmp_path / f"{name}.json"
         source.write_text(json.dumps(result(**changes)), encoding="utf-8")
@@ -230,9 +231,15 @@ def test_a_resistance_that_may_be_none_is_told_as_a_limit() -> None:
     (line,) = clinic.lines_of(result(verb="passive", curves=[other, curve], history=[]))
     assert clinic.words_of(line)[2:4] == ["none seen", "at most 0.150"]
     named = {**curve, "joint_name": "shoulder"}
-    assert verdict({"verb": "passive", "curves": [named]}) == "Half the width of the hysteresis: shoulder at most 0.15 N m (slow)."
+    assert (
+        verdict({"verb": "passive", "curves": [named]})
+        == "Half width of the hysteresis, with the movement in brackets: shoulder at most 0.15 N m (slow)."
+    )
     negative = {**named, "half_width_mean_Nm": -0.12, "half_width_interval_Nm": [-0.15, -0.09]}
-    assert verdict({"verb": "passive", "curves": [negative]}) == "Half the width of the hysteresis: shoulder -0.12 N m (slow)."
+    assert (
+        verdict({"verb": "passive", "curves": [negative]})
+        == "Half width of the hysteresis, with the movement in brackets: shoulder -0.12 N m (slow)."
+    )
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert cli.main(["passive", str(slow_arm), "-o", str(tmp_path), "--json", str(tmp_path / "x.json")]) == 0
     out, err = capsys.readouterr()
     assert "warning" not in err
-    assert "slow arm (synthetic data): Half the width of the hysteresis: shoulder 0.1" in out
+    assert "slow arm (synthetic data): Half width of the hysteresis, with the movement in brackets: shoulder 0.1" in out
     result = json.loads((tmp_path / "x.json").read_text(encoding="utf-8"))
     assert (result["verb"], len(result["curves"])) == ("passive", 2)
     assert {"angle_deg", "rising_Nm", "falling_Nm", "elastic_Nm", "elastic_std_Nm", "half_width_Nm", "inertial_share"} <= set(

@@ -72,7 +72,7 @@ def test_the_identification_in_words(results: Path) -> None:
     for part in (
         "Synthetic data: simulated, not measured", "(first table). Of the", "unknowns the movements show", "Decided by data: it rests on the measurement.", "Decided by prior: it rests on the model as given",
         "What cannot be told apart", "Calibration of the sensors", "What is left", "How to repeat", "armrs identify", "--with coulomb", f"{_armrs.build_profile} build",
-        "3 trials fitted on", "1 trial only checked on", "kg m²",
+        "3 fit trials: ", "1 test trial, which no fit has seen: ", "kg m²",
     ):  # fmt: skip
         assert part in text, part
 

@@ -94,7 +94,7 @@ def test_the_verb_writes_a_page_and_keeps_a_history(tmp_path: Path, capsys: pyte
     changed = {c["name"] for c in courses if c["changed_since_last"]}
     assert "gain" in changed and "latency" not in changed
     page = (tmp_path / "o1" / "report.html").read_text()
-    assert "Stretches of elbow" in page and "catch at" in page
+    assert "Stretches of elbow" in page and "catch angle" in page
     assert main(["report", str(tmp_path / "1.json"), "--summary", "-o", str(tmp_path / "page")]) == 0
     summary = (tmp_path / "page" / "summary.html").read_text()
     assert "Reflex strength" in summary and "higher by" in summary and "What was not measured" in summary

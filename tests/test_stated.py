@@ -45,7 +45,7 @@ def test_documents_count_the_effects_that_are_searched_for() -> None:
     assert f"the same families, {len(of_mujoco)} kinds" in said
 
 
-@pytest.mark.parametrize(("after", "closed"), [(0.1, "100%"), (0.35, "50%"), (0.2, "100%")])
+@pytest.mark.parametrize(("after", "closed"), [(0.1, "100 %"), (0.35, "50 %"), (0.2, "100 %")])
 def test_no_more_than_all_of_a_gap_is_closed(after: float, closed: str) -> None:
     """Below what repeats differ by there is nothing to close: `104 %` was printed."""
     (row,) = words.gap(gap_of(after=after)).rows
@@ -62,9 +62,9 @@ def test_the_worth_of_an_effect_is_told_in_units_of_the_scatter() -> None:
     found = {"effects": [effect(), effect(without=None)], "lack_of_fit": {"amended": {"ratio": 1.21}}}
     table = words.missing(found)
     assert table.head[2] == "off without it" and [row[2] for row in table.rows] == ["3.4", "–"]
-    assert "off by 1.1." in words.worth(found)
+    assert "With every effect it is 1.1." in words.worth(found)
     unrepeated = {"effects": [effect(without=None)], "lack_of_fit": {"amended": {"ratio": None}}}
-    assert words.missing(unrepeated).rows[0][2] == "< 1 %" and "share" in words.worth(unrepeated)
+    assert words.missing(unrepeated).rows[0][2] == "< 1 %" and "Share: " in words.worth(unrepeated)
 
 
 def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
@@ -74,7 +74,7 @@ def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
         {"lack_of_fit": lack, "effects": [effect()], "gap": {}, "open": [], "unexplained": {"share": 0.0, "looks_like": None}}
     )
     assert "2430 times" in said[0] and "more than 100 standard deviations" in said[0]
-    assert "(+0.0 standard deviations, limit 6)" in said[1]
+    assert "(+0.0 standard deviations; limit 6)" in said[1]
 
 
 def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:
@@ -240,7 +240,7 @@ def test_an_interval_that_ends_at_a_limit_says_so() -> None:
     }
     cut = even | {"name": "torque", "kind": "coulomb", "value": 0.004, "std": 0.0092, "interval": (0.0, 0.0241), "caveat": "noisy speed"}
     table = tables.estimates([even, cut], ["shoulder"], 0.95)
-    assert [dict(zip(table.head, row, strict=True))["but"] for row in table.rows] == [None, "noisy speed, interval ends at 0"]
+    assert [dict(zip(table.head, row, strict=True))["note"] for row in table.rows] == [None, "noisy speed, interval ends at 0"]
 
 
 def test_what_can_change_together_has_units() -> None:

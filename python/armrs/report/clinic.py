@@ -40,18 +40,25 @@ QUANTITIES = (
         "N m per 10°",
         math.pi / 18.0,
     ),
-    Quantity("elastic", "rest", "Resting angle", "where the joint goes by itself, without weight", "°", 180.0 / math.pi),
-    Quantity("viscous", "viscosity", "Resistance to speed", "what is added when the joint turns by 90° in a second", "N m", math.pi / 2.0),
+    Quantity("elastic", "rest", "Resting angle", "angle to which the relaxed joint returns by itself, gravity aside", "°", 180.0 / math.pi),
+    Quantity(
+        "viscous",
+        "viscosity",
+        "Resistance to speed",
+        "resistance that is added when the joint turns at 90° per second",
+        "N m",
+        math.pi / 2.0,
+    ),
     Quantity("coulomb", "torque", "Friction", "resistance to any movement, however slow", "N m", 1.0),
     Quantity(
         "stretch_reflex",
         "gain",
         "Reflex strength",
-        "what is added for every 90° per second of stretch beyond its onset",
+        "resistance that is added for every 90° per second of stretch beyond the reflex onset",
         "N m",
         math.pi / 2.0,
     ),
-    Quantity("stretch_reflex", "threshold", "Reflex onset", "speed of stretch from which on the muscle resists", "°/s", 180.0 / math.pi),
+    Quantity("stretch_reflex", "threshold", "Reflex onset", "speed of stretch above which the muscle resists", "°/s", 180.0 / math.pi),
     Quantity("stretch_reflex", "tonic", "Reflex angle", "angle beyond which the onset is lowest", "°", 180.0 / math.pi),
     Quantity("stretch_reflex", "latency", "Reflex delay", "time from stretch to resistance", "ms", 1000.0),
 )
@@ -59,7 +66,7 @@ HALF_WIDTH = Quantity(
     "passive",
     "half_width",
     "Resistance to slow movement",
-    "half of the difference between moving to and fro, friction and speed together",
+    "half of the difference between both directions of movement; it contains friction and resistance to speed",
     "N m",
     1.0,
 )
@@ -69,7 +76,7 @@ SLOW = (
         "passive",
         "stiffness",
         "Stiffness, slow movement",
-        "how much more the joint pulls back for every 10° further",
+        "how much more the joint pulls back for every 10° further; errors in the assumed weight of the arm can make it negative",
         "N m per 10°",
         math.pi / 18.0,
     ),
@@ -77,7 +84,7 @@ SLOW = (
         "passive",
         "range",
         "Range moved through",
-        "how far the joint was moved in one movement, no test of how far it can go",
+        "how far the joint was moved in one movement; this is no test of how far it can go",
         "°",
         180.0 / math.pi,
     ),
@@ -89,7 +96,7 @@ AS_ARMRS = (1.0, 0.0)
 """How an angle is counted: sign, and the angle of armrs that is called zero [deg]."""
 ANGLES = ("rest", "tonic")
 """Parameters that are angles."""
-ZERO = "the first joint's from the horizontal, the others' from the straight line on, positive counter-clockwise with forward to the right"
+ZERO = "the first joint counts from the horizontal, at the others 0° is straight; positive is counter-clockwise with forward to the right"
 """How armrs counts angles, in words."""
 MOST_TRENDS, PANEL, WIDEST = 6, (2.4, 1.55), 20
 """Plots over the sessions that find room on a page, the size of one [inch], and the letters in a line above it."""
@@ -99,7 +106,7 @@ ANALYSED = ("identify", "passive", "gap", "spasticity")
 """Results of which a summary is made."""
 _OF_EVERY_JOINT = ("elastic", "rate", "dry")
 """Families of laws that every joint has: they stand in the table of the joint."""
-_MOVING = "a joint rubs and may stick, which the analysis follows only roughly"
+_MOVING = "a joint has friction and may stick, which the analysis models only roughly"
 
 
 @dataclass(frozen=True)
@@ -282,7 +289,7 @@ def estimates(lines: Sequence[Line], results: Sequence[Mapping[str, Any]]) -> st
 _WHY = {
     "identify": "The page of identify fits a spring, resistance to speed and friction to every joint",
     "passive": "The page of passive reads slow movements alone",
-    "gap": "The page of gap fits only what the recordings ask for, and beside it everything else that it found",
+    "gap": "The page of gap fits only what the recordings ask for, together with everything else that it found",
     "spasticity": "The page of spasticity fits a reflex beside resistance and friction",
 }
 """Why an analysis states another number than the one before it."""
@@ -294,7 +301,7 @@ def _apart(lines: Sequence[Line]) -> list[str]:
     for line in _once(lines):
         own = [o for o in lines if (o.joint, o.quantity.title) == (line.joint, line.quantity.title) and o.interval is not None]
         if own and max(o.interval[0] for o in own if o.interval) > min(o.interval[1] for o in own if o.interval):
-            said.append(f"{line.joint}: {line.quantity.title.lower()} differs between the analyses by more than both are uncertain.")
+            said.append(f"{line.joint}: {line.quantity.title.lower()} differs between the analyses by more than the uncertainty of both.")
     return said
 
 
@@ -552,7 +559,7 @@ def _is_dry(kind: str) -> bool:
 def _intervals(doubted: Sequence[str]) -> str:
     """Return what intervals claim."""
     beside = f"; here they may be too narrow: {'; '.join(dict.fromkeys(doubted))}" if doubted else ""
-    return f"95 % intervals. They hold where the joint behaves as a spring with resistance and friction{beside}."
+    return f"95 % intervals. They hold if the joint behaves as a spring with resistance and friction{beside}."
 
 
 def _picture(lines: Sequence[Line], intervals: str) -> html.Picture | None:

@@ -44,7 +44,7 @@ def _between(value: Mapping[str, Any], factor: float, held_in: str) -> str:
     """Return a value in the unit that is `1 / factor` of its own, with its interval."""
     std = factor * value["std"]
     shown, low, high = (tables.number(factor * x, std) for x in (value["value"], *value["interval"]))
-    return f"{shown} {held_in} (95 %: {low} to {high})"
+    return f"{shown} {held_in} (95 % interval {low} to {high})"
 
 
 def reflexes(result: Mapping[str, Any]) -> Table:
@@ -52,12 +52,12 @@ def reflexes(result: Mapping[str, Any]) -> Table:
     joints, rows = result["data"]["joints"], []
     for effect, besides in zip(result["effects"], result["besides"], strict=True):
         own = {k: v for k, v in effect["parameters"].items() if k != "direction"} if effect["decided"] else {}
-        own |= {"viscosity besides": besides["viscosity"], "dry friction besides": besides["dry"]}
+        own |= {"viscosity besides reflex": besides["viscosity"], "dry friction besides reflex": besides["dry"]}
         for name, value in own.items():
-            shown = [tables.number(x, value["std"]) for x in (value["value"], *value["interval"])]
-            rows.append(
-                [joints[effect["joint"] - 1], name, shown[0], tables.spread(value["std"]), f"{shown[1]} … {shown[2]}", value["unit"]]
-            )
+            factor, held_in = (1000.0, "ms") if value["unit"] == "s" else tables.read_in(value["unit"])
+            std = factor * value["std"]
+            shown = [tables.number(factor * x, std) for x in (value["value"], *value["interval"])]
+            rows.append([joints[effect["joint"] - 1], name, shown[0], tables.spread(std), f"{shown[1]} … {shown[2]}", held_in])
     return Table(["joint", "quantity", "estimate", "± std", "95 % interval", "unit"], rows, left=2)
 
 
@@ -76,7 +76,7 @@ def stretches(result: Mapping[str, Any]) -> Table:
         cells += [mean("catch_angle", degrees), mean("catch_speed", degrees), mean("emg_latency", 1000.0), mean("co_contraction")]
         rows.append([joints[joint - 1], configuration, len(own), *cells])
     head = ["joint", "movement", "repeats", "speed [°/s]", "peak [N m]", "work [J]", "elastic [N m]", "viscous and dry [N m]"]
-    head += ["reflex [N m]", "catch at [°]", "its speed [°/s]", "EMG after [ms]", "co-contraction"]
+    head += ["reflex [N m]", "catch angle [°]", "speed there [°/s]", "EMG latency [ms]", "co-contraction"]
     used = [k for k in range(len(head)) if k < len(head) - 2 or any(row[k] != "–" for row in rows)]
     return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2)
 

@@ -9,7 +9,8 @@ from typing import Protocol
 NO_CHANGE = "no clear change"
 CLEAR = ("higher", "lower")
 """How the words of a clear change begin."""
-SURE = "How sure: where nothing changed, each analysis calls something changed in 1 of 20 sessions."
+SURE = "How sure: if nothing had changed, each analysis would still report a change in 1 of 20 sessions."
+EITHER_WAY = "The number behind ± is half of a 95 % interval."
 
 
 class Titled(Protocol):
@@ -63,7 +64,8 @@ def said(rows: Sequence[Row]) -> list[str]:
     if clear:
         lines.append(SURE)
     unclear = "; ".join(f"{joint} ({', '.join(own)})" for joint, own in same.items())
-    return [*lines, *([f"No clear change: {unclear}."] if same else [])]
+    lines += [f"No clear change: {unclear}."] if same else []
+    return [*lines, *([EITHER_WAY] if followed else [])]
 
 
 def _with_unit(row: Row) -> str:

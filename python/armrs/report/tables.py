@@ -73,17 +73,17 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
             "{} … {}".format(*(number(v, item["std"]) for v in item["interval"])),
             unit(item["unit"]),
             item["decided_by"],
-            _but(item),
+            _note(item),
             None if item.get("given") is None else f"{item['given']:.4g}",
         ]
         for item in items
     ]
-    head = ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "but", "in the model"]
+    head = ["quantity", "where", "estimate", "± std", f"{100 * level:g} % interval", "unit", "decided by", "note", "in the model"]
     used = [k for k in range(len(head)) if any(row[k] not in (None, "") for row in rows)]
     return Table([head[k] for k in used], [[row[k] for k in used] for row in rows], left=2 if 1 in used else 1, symbols=True)
 
 
-def _but(item: Mapping[str, Any]) -> str | None:
+def _note(item: Mapping[str, Any]) -> str | None:
     """Return what is to be said against an estimate: its caveat, and that its interval ends at a physical limit."""
     said = [item["caveat"]] if item.get("caveat") else []
     below, above = (abs(end - item["value"]) for end in item["interval"])
@@ -150,12 +150,13 @@ def unit(text: str) -> str:
 
 
 def read_in(held_in: str) -> tuple[float, str]:
-    """Return the factor to the unit in which people read what is held in another, and that unit: angles in degrees.
+    """Return the factor to the unit in which people read what is held in another, and that unit: angles and their speeds in degrees.
 
     >>> read_in("Nm"), read_in("rad")[1]
     ((1.0, 'N m'), '°')
     """
-    return (math.degrees(1.0), "°") if held_in == "rad" else (1.0, unit(held_in))
+    degrees = {"rad": "°", "rad/s": "°/s"}.get(held_in)
+    return (1.0, unit(held_in)) if degrees is None else (math.degrees(1.0), degrees)
 
 
 def number(value: float | None, std: float | None) -> str:

@@ -17,41 +17,42 @@ if TYPE_CHECKING:
 SYMBOLS_ON_PAGES = SYMBOLS.replace(", l the", ", ℓ the")
 """The same for pages, on which `tables.typeset` sets the names."""
 HISTORY_MEANING = (
-    "What was measured in each session. A change is set against the uncertainty of both sessions, which is the scatter of their own "
-    "repeats, and called one at a level of 5 % over all parameters together. What differs between days without being a change of the "
-    "joint, such as where the arm was strapped, is not in that scatter. p is the probability of a difference at least as large without a "
-    "change, corrected for the number of parameters (Holm)."
+    "What was measured in each session; ± is one standard deviation. A change has the uncertainty of both sessions, from "
+    "the scatter of their own repeats. Differences between days that are no change of the joint, such as another strapping of the "
+    "arm, are not in this scatter. p is the probability of a difference at least as large without a change, corrected for the number of "
+    "parameters (Holm). A parameter counts as changed if p is below 5 %."
 )
 PASSIVE_MEANING = (
-    "The passive moment is the torque with which a relaxed joint resists: the torque of the contact force, less weight and inertia. "
-    "Elastic mean: mean of both directions of motion, which also contains errors in the masses of the model. Half width: half of their "
-    "difference, the dissipative part, with its standard deviation over the repeats (± std). Inertial share: size of the inertial torque "
-    "that was subtracted, relative to the moment. Only the weight and inertia of the model are subtracted: its springs, friction and "
-    "other effects remain in these moments."
+    "The passive moment is the torque with which a relaxed joint resists: the torque of the contact force minus gravity and inertia, "
+    "positive where it acts against a growing angle. Elastic mean: mean of both directions of motion, which also contains errors in the "
+    "masses of the model. Half width: half of their difference, the dissipative part, with its standard deviation over the repeats "
+    "(± std). Inertial share: size of the inertial torque that was subtracted, relative to the moment. Only gravity and inertia of the "
+    "model are subtracted: its springs, friction and other effects remain in these moments."
 )
 
 DEPENDENCE_MEANING = (
     "The elastic moment of a joint as a function of its own and of the adjacent angle: an exponential at each end of the measured range "
     "(upper and lower: its moment at that end; steepness: how fast it rises), a straight line (stiffness), a coupling (change with the "
-    "adjacent angle) and a constant (moment). Intervals are in brackets; a term of zero is not needed. Where this law, which is linear in "
-    "the adjacent angle, is not enough, each end moves with the adjacent angle as well: by minus its ratio for each degree of it. The "
+    "adjacent angle) and a constant (moment). 95 % intervals are in brackets; a term of zero is not needed. If this law, which is linear "
+    "in the adjacent angle, is not enough, each end moves with the adjacent angle as well: by minus its ratio for each degree of it. The "
     "mean coupling is that of the linear law; a small p speaks for a coupling, or against the linear law."
 )
 
 INTERVALS = (
-    "± is one standard deviation. Intervals take Student's t with Satterthwaite's degrees of freedom: the number of independent data "
-    "blocks less one where the scatter of the data alone makes up the standard deviation, and more, up to the normal distribution, the "
-    "more of it comes from the model as given or from the tolerances of the sensors. They end at physical limits."
+    "± is one standard deviation. Intervals use Student's t with Satterthwaite's degrees of freedom. If the scatter of the data alone "
+    "makes up the standard deviation, these are the number of independent data blocks minus one. The more of it comes from the model as "
+    "given or from the tolerances of the sensors, the closer the interval is to that of the normal distribution. Intervals end at "
+    "physical limits."
 )
 
 PREDICTED = (
-    "Standard deviations to be expected: with what is known beforehand, and from the data alone. What the model lacks is not in them. "
-    "Relative: the latter beside the value; a parameter of an effect that is small counts as 0.05."
+    "± std to expect: standard deviation of the estimate with what is known beforehand. ± std of the data: from the data alone. What the "
+    "model lacks is in neither. Relative: ± std of the data divided by the value; a small parameter of an effect counts as 0.05."
 )
 
 WRONG_MASS = (
-    "A mass or centre of mass that is wrong in the model looks like a coupling too: its weight depends on the sum of both angles, and so "
-    "does what is left of it."
+    "A wrong mass or centre of mass in the model looks like a coupling too: the gravity moment depends on the sum of both angles, and so "
+    "does an error in it."
 )
 
 
@@ -94,7 +95,7 @@ def _identified(result: Mapping[str, Any]) -> str:
         counts.append(f"a physical limit {by.count('bound')}")
     ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
     if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
-        ending += " Speeds are noise to a good part: what rests on the measurement is off by more than its intervals say."
+        ending += " The speeds are largely noise: what rests on the measurement is off by more than its intervals say."
     shown = tables.measured(result)
     measured = tables.how_many(len(shown), "quantity", "quantities") + (" (first table)" if shown else "")
     return f"Measured: {measured}. Of the {len(by)} parameters, {', '.join(counts)}.{ending}"
@@ -134,13 +135,14 @@ def _coupled(result: Mapping[str, Any]) -> str:
 def _passive(result: Mapping[str, Any]) -> str:
     if not result["curves"]:
         return "No joint moved far enough in both directions to tell its passive moment."
-    parts = []
+    parts: dict[str, list[str]] = {}
     for curve in result["curves"]:
         low, high = curve.get("half_width_interval_Nm") or (None, None)
         unclear = low is not None and high is not None and low <= 0.0 < high
         size = f"at most {high:.2g}" if unclear else f"{curve['half_width_mean_Nm']:.3g}"
-        parts.append(f"{curve['joint_name']} {size} N m ({curve['configuration']})")
-    return f"Half the width of the hysteresis: {'; '.join(parts)}."
+        parts.setdefault(curve["joint_name"], []).append(f"{size} N m ({curve['configuration']})")
+    said = "; ".join(f"{joint} {', '.join(sizes)}" for joint, sizes in parts.items())
+    return f"Half width of the hysteresis, with the movement in brackets: {said}."
 
 
 def _planned(result: Mapping[str, Any]) -> str:
@@ -164,14 +166,14 @@ def _demo(result: Mapping[str, Any]) -> str:
 def data_lines(data: Mapping[str, Any]) -> list[str]:
     """Return what a result rests on."""
     lines = []
-    for role, meaning in (("fit", "fitted on"), ("test", "only checked on")):
+    for role, meaning in (("fit", ""), ("test", ", which no fit has seen")):
         part = data[role]
         if part["trials"]:
             lines.append(
-                f"{part['trials']} trial{'s' * (part['trials'] > 1)} {meaning}: {part['duration_s']:.0f} s, {part['samples']} samples."
+                f"{tables.how_many(part['trials'], f'{role} trial')}{meaning}: {part['duration_s']:.0f} s, {part['samples']} samples."
             )
     if not data["test"]["trials"]:
-        lines.append("No test trials: nothing was checked on data that the fit has not seen.")
+        lines.append("No test trials: nothing was checked on data that no fit has seen.")
     lines.append(f"Movements: {', '.join(data['configurations'])}.")
     held = [word for word, there in (("contact forces", data["forces"]), ("joint torques", data["torques"])) if there]
     lines.append(f"Measured: angles, {', '.join(held)}.")
@@ -220,18 +222,18 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     head(result, verdict(result))
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
-    print(f"{SYMBOLS}\n{INTERVALS}\n")
+    print("\n".join([SYMBOLS, INTERVALS, *decided_lines(result["parameters"])]) + "\n")
     show(
-        "Sensor calibration; the prior is the declared tolerance",
+        "Sensor calibration; the prior is the declared tolerance, one standard deviation",
         tables.estimates(result["calibration"], joints, level),
     )
     show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
     lines = cannot_tell(result)
     if lines:
-        print(f"What cannot be told apart: {independent(result)}")
+        print(f"What cannot be told apart: {independent(result)}.")
         print("\n".join(f"  {line}" for line in lines))
     if not data["test"]["trials"]:
-        print("No test trials: nothing was checked on data that the fit has not seen.")
+        print("No test trials: nothing was checked on data that no fit has seen.")
     followed(result)
     files_written(written)
 
@@ -300,14 +302,15 @@ def couplings(result: Mapping[str, Any]) -> list[str]:
     """Say for each pair of joints whether their elastic moments depend on one another."""
     found = result.get("couplings", ())
     lines = [
-        f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: {c['value_Nm_rad']:.3g} N m/rad "
-        f"from both, standard deviation {c['std_Nm_rad']:.2g} N m/rad (p = {c['p_value']:.2g})"
+        f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: "
+        f"{tables.number(c['value_Nm_rad'], c['std_Nm_rad'])} ± {tables.spread(c['std_Nm_rad'])} N m/rad, from the moments of both joints "
+        f"(± is one standard deviation, p = {c['p_value']:.2g})."
         for c in found
     ]
     lines += [WRONG_MASS] * any(c["coupled"] for c in found)
     moving = [d for d in result.get("dependence", ()) if not d["linear"]]
     return lines + [
-        f"{d['joint_name']}: the linear law is not enough; the ends of its range move with the {d['adjacent_name']}" for d in moving
+        f"{d['joint_name']}: the linear law is not enough; the ends of its range move with the {d['adjacent_name']}." for d in moving
     ]
 
 

@@ -53,7 +53,7 @@ def is_led(result: Mapping[str, Any]) -> bool:
 
 FORMULAS = (
     "In formulas, R is the torque with which a joint resists, q its angle and q̇ its speed. Tables name effects as a model file does; "
-    "angles are in degrees here and in radians there."
+    "angles and their speeds are in degrees here and in radians there."
 )
 
 
