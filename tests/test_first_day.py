@@ -119,7 +119,7 @@ def test_the_robot_is_read_off_its_angles(world: Path, imported: Path) -> None:
     assert np.abs(np.subtract(found.base, true.base)).max() < 2e-3
     checked = armrs.check_dataset(imported)
     assert {v.verb: v.able for v in checked.verbs} == {"identify": True, "passive": True, "gap": True}
-    assert next(v.why for v in checked.verbs if v.verb == "gap") == "in the closed chain with the robot"
+    assert next(v.why for v in checked.verbs if v.verb == "gap") == "by angles and forces, arm and robot simulated together"
 
 
 def test_a_missing_robot_is_told(imported: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -455,13 +455,13 @@ def _how_passive(efforts: Sequence[Trial]) -> str:
 def _how_gap(dataset: Dataset) -> str:
     """Return how `gap` compares, and why where it cannot simulate the robot."""
     if _is_led(dataset):
-        return "in the closed chain with the robot"
+        return "by angles and forces, arm and robot simulated together"
     absent = {
         "[robot] in the model": dataset.model.robot is None,
         "the robot's angles (qr1, qr2)": any(t.robot_q is None for t in dataset.trials),
         "contact forces": any(t.force_on_arm is None for t in dataset.trials),
     }
-    return f"by joint torques, without {', '.join(name for name, lacks in absent.items() if lacks)}"
+    return f"by joint torques only, for lack of {', '.join(name for name, lacks in absent.items() if lacks)}"
 
 
 def _speed(trial: Trial) -> float:

@@ -346,7 +346,7 @@ def of_slow_movements(slow: GapFound) -> list[str]:
         if rivals:
             lines.append(f"{name}: cannot be told from {joined([title(kind) for kind in rivals], 'or')} by these movements")
         else:
-            lines.append(f"{name}: no other effect explains them as well")
+            lines.append(f"{name}: no other effect explains the movements as well")
     return lines
 
 

@@ -464,7 +464,7 @@ _ROUNDING = 1e-12
 def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
     """Return what no arm can be, a line each."""
     return tuple(
-        f"{e.name} was driven to its lower limit: does force_on name the right side, and does the robot fit?"
+        f"{e.name} was driven to its lower limit: is force_on right, and is [robot] that of the laboratory?"
         for e in parameters
         if e.kind == "segment" and e.decided_by == "bound" and e.name.startswith("m") and abs(e.value) <= 1e-2 * abs(e.interval[1])
     )
@@ -476,9 +476,9 @@ def _alone(dataset: Dataset, parameters: Sequence[Estimate]) -> tuple[str, ...]:
         return ()
     laws = [e for e in parameters if e.kind != "segment" and e.decided_by == "data" and e.std > _WIDE * abs(e.value)]
     names = ", ".join(dict.fromkeys(f"{e.name} of joint {e.joint}" for e in laws))
-    wide = f"; wide, more than {_WIDE:.0%} of the value: {names}" if names else ""
+    wide = f"; standard deviations above {100 * _WIDE:.0f} % of the value: {names}" if names else ""
     return (
-        "one fit trial: how repeats differ is not known, so the intervals hold for this one recording, its handle and its calibration"
+        "one fit trial: the scatter of repeats is not known, so the intervals hold for this one recording, its handle and its calibration"
         f"{wide}; record repeats of each movement",
     )
 
@@ -491,7 +491,7 @@ def _beyond_segment(model: Model, parameters: Sequence[Estimate]) -> tuple[str, 
         if e.kind == "segment" and e.unit == "m" and e.value > length * (1.0 + _ROUNDING):
             lines.append(
                 f"{e.name} came out as {e.value:.3g} m, beyond the end of its segment of {length:g} m: "
-                "the model written has more mass there instead, of the same moment"
+                "the written model has a larger mass instead, with the same first moment"
             )
     return tuple(lines)
 
@@ -529,8 +529,9 @@ leaves or takes goes into masses and calibration."""
 def _noisy_speeds(shares: Sequence[float]) -> tuple[str, ...]:
     """Return the joints whose speeds are noise for a large part, a line each."""
     return tuple(
-        f"the speed of joint {j} comes from noisy angles (noise {share:.0%} of the speed): friction, viscosity and inertia are biased by "
-        "more than their intervals say, and masses with them; give the robot's angles and a [robot], measured speeds, or a lower cutoff"
+        f"the speed of joint {j} comes from noisy angles (noise {100 * share:.0f} % of the speed): friction, viscosity and inertia are "
+        "biased by more than their intervals say, and masses with them; record the robot's angles and state [robot], or record speeds, or lower "
+        "the cutoff"
         for j, share in enumerate(shares, start=1)
         if share > _armrs.SPEED_NOISE_ALLOWED
     )

@@ -575,7 +575,7 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
         # Where no repeat tells, it is the movement and not a sensor, and that its joints are left out says so.
         if telling and not m.direction.any():
             lines.append(
-                f"{m.trial.file}: no joint moves long enough in it to tell its direction: it counts nowhere (unit, or a dead sensor?)"
+                f"{m.trial.file}: no joint moves long enough to tell its direction: the trial is not used (wrong unit, or a dead sensor?)"
             )
         if m.force is None or not there.any():
             continue
