@@ -530,8 +530,8 @@ def _noisy_speeds(shares: Sequence[float]) -> tuple[str, ...]:
     """Return the joints whose speeds are noise for a large part, a line each."""
     return tuple(
         f"the speed of joint {j} comes from noisy angles (noise {100 * share:.0f} % of the speed): friction, viscosity and inertia are "
-        "biased by more than their intervals say, and masses with them; record the robot's angles and state [robot], or record speeds, or lower "
-        "the cutoff"
+        "biased by more than their intervals say, and masses with them; record the robot's angles and state [robot], or record speeds, "
+        "or lower the cutoff"
         for j, share in enumerate(shares, start=1)
         if share > _armrs.SPEED_NOISE_ALLOWED
     )
