@@ -91,7 +91,7 @@ def test_the_search_finds_the_brakes_and_closes_the_gap(folder: Path, result: di
         channel = gap["gap"][name]
         assert channel["after"] < 1.1 * channel["floor"] < 0.6 * channel["calibrated"]
     assert result["verdict"].startswith(
-        "The search found both brakes (0.139 and 0.161 N m were hidden). Missing from the model are Coulomb friction in joint 2 (elbow), torque 0.1"
+        "The search found both brakes (0.139 and 0.161 N m were hidden). Missing from the model are Coulomb friction in joint 1 (shoulder), torque 0.1"
     )
     assert "coulomb = 0.0" in (folder / "session/model.toml").read_text(encoding="utf-8")
 
