@@ -403,7 +403,7 @@ def test_a_quick_answer_on_the_command_line(found: armrs.GapFound, tmp_path: Pat
     write_dataset(found.dataset, tmp_path / "data")
     assert cli.main(["gap", str(tmp_path / "data"), "--quick", "--json", str(tmp_path / "quick.json")]) == 0
     out = capsys.readouterr().out
-    assert "a first look: viscous damping in joint 2" in out
+    assert "viscous damping in joint 2 explains" in out
     assert "Nothing is named yet" in out
     result = json.loads((tmp_path / "quick.json").read_text(encoding="utf-8"))
     assert (result["suspects"][0]["kind"], result["suspects"][0]["joint"]) == ("viscous", 2)
