@@ -110,8 +110,8 @@ def qualisys(run: armrs.Simulation, folder: Path) -> Path:
     return folder
 
 
-def motive(run: armrs.Simulation, folder: Path) -> Path:
-    """Markers with y up, as Motive exports them, and the force of another device on its own clock."""
+def motive(run: armrs.Simulation, folder: Path, *, of_markers: bool = False) -> Path:
+    """Markers with y up, as Motive exports them, and the force of another device on its own clock, in its axes or in those of the markers."""
     at = 1e-3 * markers(run, up=1, forward=2)
     n = len(run.t)
     names = [name for name in ("Arm:SHO", "Arm:ELB", "Arm:HAND") for _ in "XYZ"]
@@ -125,8 +125,10 @@ def motive(run: armrs.Simulation, folder: Path) -> Path:
     ]  # fmt: skip
     written(folder / "slow_1.csv", [*head, *rows(np.column_stack([np.arange(n), run.t, at.reshape(n, 9)]), ",")])
     clock = np.arange(0.0, run.t[-1] + 2.0, 0.004)
-    force = np.column_stack([np.interp(clock - 1.3, run.t, f) for f in -run.force_on_arm.T])
-    written(folder / "slow_1_force.csv", ["time [s],Fy [N],Fz [N]", *rows(np.column_stack([clock, force]), ",")])
+    own = forces(run, up=1, forward=2) if of_markers else -run.force_on_arm
+    force = np.column_stack([np.interp(clock - 1.3, run.t, f) for f in own.T])
+    names = [f"F{axis} [N]" for axis in ("xyz" if of_markers else "yz")]
+    written(folder / "slow_1_force.csv", [",".join(["time [s]", *names]), *rows(np.column_stack([clock, force]), ",")])
     return folder
 
 
@@ -153,9 +155,10 @@ CASES: dict[str, tuple[Callable[..., Path], dict[str, object], float]] = {
     "Vicon with tabs, from frame 101": (lambda run, folder: vicon(run, folder, first=101, sep="\t"), MARKERS, 1e-6),
     "Qualisys": (qualisys, MARKERS, 1e-6),
     "OptiTrack": (motive, MARKERS, 2e-2),
+    "OptiTrack, force in the axes of the markers": (lambda run, folder: motive(run, folder, of_markers=True), MARKERS, 2e-2),
     "KUKA": (kuka, {}, 2e-2),
 }
-"""Writer, options of the import, and the error of the forces as a share of the largest: of the two with a clock of their own, as documented."""
+"""Writer, options of the import, and the error of the forces as a share of the largest: of those with a clock of their own, as documented."""
 
 
 @pytest.mark.parametrize("case", CASES)

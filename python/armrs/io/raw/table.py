@@ -79,6 +79,8 @@ class RawTable:
         Trajectories of markers, where the recording has them; the columns may be on another clock.
     remarks : tuple of Remark
         What the columns of words say.
+    plane : ndarray, shape (2, 3), or None
+        Unit vectors forward and up in the plane of the movement, in the axes of the markers, where the angles are those of markers.
     """
 
     path: Path
@@ -87,6 +89,7 @@ class RawTable:
     notes: tuple[str, ...] = field(default=())
     markers: Markers | None = None
     remarks: tuple[Remark, ...] = ()
+    plane: np.ndarray | None = None
 
     @property
     def called(self) -> str:

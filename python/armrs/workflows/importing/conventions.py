@@ -26,6 +26,8 @@ _UNEXPLAINED = 0.6
 """With more than this unexplained, no convention fits."""
 _CONTRADICTED, _BY = 0.04, 2.0
 """What is stated is refused when it leaves at least this share, and so many times what the best convention leaves."""
+OF_MARKERS = "of markers"
+"""Key of what is given: whether the angles are those of markers, which are computed in the convention of armrs."""
 _STATED = {"reference": "--angles", "zero": "--zero", "signs": "--clockwise", "force_on": "--force-on"}
 
 
@@ -63,8 +65,10 @@ def to_model_angles(raw: np.ndarray, convention: Convention) -> np.ndarray:
 def candidates(n_joints: int, given: Mapping[str, object], has_force: bool) -> Iterator[Convention]:
     """Give the conventions that agree with what is given, the usual one first.
 
-    `given` may hold `reference`, `zero`, `signs` and `force_on`.
+    `given` may hold `reference`, `zero`, `signs` and `force_on`, and `OF_MARKERS`, which leaves the body that the force acts on.
     """
+    if given.get(OF_MARKERS):
+        given = {"reference": "relative", "zero": "horizontal", "signs": (1,) * n_joints, **given}
     references = REFERENCES if "reference" not in given and n_joints > 1 else (given.get("reference", "relative"),)
     zeros = ZEROS if "zero" not in given else (given["zero"],)
     signs = itertools.product((1, -1), repeat=n_joints) if "signs" not in given else [given["signs"]]
@@ -128,12 +132,14 @@ def decide(
 
 def _contradicted(model: Model, motion: Motion | None, given: Mapping[str, object], best: Balance) -> BadInput | None:
     """Return the refusal of what is stated where the arm balances in another convention and not in any that agrees with it."""
-    if not given or best.unexplained < _CONTRADICTED:
+    stated = {key: value for key, value in given.items() if key in _STATED}
+    if not stated or best.unexplained < _CONTRADICTED:
         return None
-    free = min((balance(model, motion, c) for c in candidates(model.n_joints, {}, has_force=True)), key=lambda b: b.unexplained)
+    others = {key: value for key, value in given.items() if key not in _STATED}
+    free = min((balance(model, motion, c) for c in candidates(model.n_joints, others, has_force=True)), key=lambda b: b.unexplained)
     if free.unexplained > _UNEXPLAINED or best.unexplained < _BY * free.unexplained:
         return None
-    wrong = [_STATED[key] for key, value in given.items() if getattr(free.convention, key) != value]
+    wrong = [_STATED[key] for key, value in stated.items() if getattr(free.convention, key) != value]
     found = Text(f"{100 * best.unexplained:.0f} % of the contact torques unexplained in every convention that agrees with it")
     allowed = f"{free.convention.words()}, which leaves {100 * free.unexplained:.2g} %"
     return BadInput(" and ".join(wrong), found, allowed, hint="leave the option out, and compare recording.png with the laboratory")

@@ -254,6 +254,9 @@ def _decided(
             sources.notes.append(f"left out, since it holds neither joint angles nor forces: {table.path}")
         else:
             problems.append(BadInput("file", Text("neither joint angles nor forces"), "columns of one of them", file=table.path))
+    named, projected = _in_plane(named, mapped)
+    if all(n.table.plane is not None for n in named):
+        given = {**given, conventions.OF_MARKERS: True}
     of_files = len(problems)  # that whole files are left out keeps no other file from being judged
     channels = columns.guess([n.table for n in named], _present(mapped, named[0].table), problems)
     force_tables = [n.forces for n in named if n.forces is not None]
@@ -285,11 +288,25 @@ def _decided(
         raise BadInputs.of(problems, _TOLD_BY)
     origin = _origin(reads, channels, convention, model, axes)
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), sources.points, origin, rate)
-    notes = [*sources.notes, *remarks.said(tables), *axes, *partial]
+    notes = [*sources.notes, *remarks.said(tables), *projected, *axes, *partial]
     notes += [f"{c.symbol}: column {c.column!r}, {c.why}" for c in channels]
     notes += _unused([t for n in named for t in (n.table, n.forces) if t is not None], channels)
     notes += [f"{convention.words()}: {convention.why}", f"roles: {roles}"]
     return recipe, reads, [*notes, *clocks], doubts
+
+
+def _in_plane(named: Sequence[trials.Named], mapped: Mapping[str, object]) -> tuple[list[trials.Named], list[str]]:
+    """Return trials with the forces of other files in the plane that their markers show, and what is said of it; mapped forces stay."""
+    if any(symbol.startswith("F") for symbol in mapped):
+        return list(named), []
+    found = [n if n.forces is None else changed(n, forces=raw.in_plane(n.forces, n.table)) for n in named]
+    # What their reader said of them is said with all tables.
+    told = [
+        changed(after.forces, notes=after.forces.notes[len(before.forces.notes) :], remarks=())
+        for before, after in zip(named, found, strict=True)
+        if before.forces is not None and after.forces is not None
+    ]
+    return found, remarks.said(told)
 
 
 def _alike(tables: Sequence[RawTable], channels: Sequence[Channel], problems: list[BadInput]) -> None:
@@ -438,7 +455,10 @@ def _reread(recipe: Recipe, folder: Path) -> list[Read]:
         trial = changed(kept, file=os.fspath(folder / kept.file), force_file=forces)
         try:
             table = table_of(trial.file, trial.table, recipe.points)
-            reads.append(Read(trial, table, table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None))
+            own = table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None
+            if own is not None and any(own.find(c.column) is None for c in recipe.channels if c.symbol == "Fy"):
+                own = raw.in_plane(own, table)
+            reads.append(Read(trial, table, own))
         except BadInput as error:
             problems.append(error)
     if problems:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from dataclasses import replace as changed
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,10 @@ from ...io.markers import planar_motion
 from ...io.raw import SUFFIXES, NoTable, RawColumn, RawTable, read_raw
 from . import columns, joint_markers
 
-_AXES = ("Fx", "Fy", "Fz")
+_AXES = ("x", "y", "z")
+_PROJECTED = {"Fy": "force forward", "Fz": "force upward", "Mx": "moment about the normal"}
+"""Names of the columns of what is projected onto the plane of the movement."""
+_SAID = {"F": "forward is {}, up is {}", "M": "the normal of the plane is {}"}
 _MOST = 5
 """Files that a line names at most."""
 
@@ -149,21 +153,44 @@ def _with_angles(table: RawTable, points: tuple[str, ...]) -> RawTable:
     found = [RawColumn("time", "time", "s", motion.t)]
     found += [RawColumn(f"q{j}", f"q{j}", "rad", np.ascontiguousarray(q)) for j, q in enumerate(motion.q.T, start=1)]
     clock = next((c.values for c in table.columns if columns.symbol_of(c) == "t"), motion.t)
-    named = [(columns.symbol_of(c) or "", c) for c in table.columns]
     others = [
-        RawColumn(c.name, c.label, c.unit, np.interp(motion.t, clock, c.values))
-        for symbol, c in named
-        if symbol != "t" and not symbol.startswith(("q", "dq"))
+        changed(c, values=np.interp(motion.t, clock, c.values))
+        for c in table.columns
+        if not (symbol := columns.symbol_of(c) or "").startswith(("q", "dq")) and symbol != "t"
     ]
-    forces = {symbol: c for symbol, c in named if symbol in _AXES}
-    notes = [*table.notes, f"angles from the markers {', '.join(points)}", *motion.warnings()]
-    if len(forces) == sum(symbol in _AXES for symbol, _ in named) == len(_AXES) and len({c.unit for c in forces.values()}) == 1:
-        in_file = np.column_stack([np.interp(motion.t, clock, forces[axis].values) for axis in _AXES])
-        unit_of_all = forces[_AXES[0]].unit
-        names = {c.name for c in forces.values()}
-        others = [c for c in others if c.name not in names]
-        for symbol, direction in (("Fy", motion.forward), ("Fz", motion.upward)):
-            others.append(RawColumn(symbol, symbol, unit_of_all, in_file @ direction))
-        said = (" ".join(f"{round(value, 3) + 0.0:+.3f}" for value in direction) for direction in (motion.forward, motion.upward))
-        notes.append("forces: {} are taken in the axes of the markers; forward is ({}), up is ({})".format(", ".join(sorted(names)), *said))
-    return RawTable(table.path, table.title, (*found, *others), tuple(notes))
+    plane = np.array([motion.forward, motion.upward])
+    others, notes = _projected(others, plane)
+    notes = [*table.notes, f"angles from the markers {', '.join(points)}", *motion.warnings(), *notes]
+    return RawTable(table.path, table.title, (*found, *others), tuple(notes), plane=plane)
+
+
+def in_plane(forces: RawTable, angles: RawTable) -> RawTable:
+    """Return a table of forces in the plane of the movement that the markers of another recording show, as it is without markers."""
+    if angles.plane is None:
+        return forces
+    found, notes = _projected(forces.columns, angles.plane)
+    return changed(forces, columns=tuple(found), notes=(*forces.notes, *notes))
+
+
+def _projected(own: Sequence[RawColumn], plane: np.ndarray) -> tuple[list[RawColumn], list[str]]:
+    """Return columns with a force of three components in the plane, and a moment about its normal; what is said of that.
+
+    `plane` are the directions forward and up, (2, 3), in the axes of force and moment.
+    """
+    kept, notes = list(own), []
+    for kind, said, names, directions in (
+        ("F", "forces", ("Fy", "Fz"), plane),
+        ("M", "moments", ("Mx",), np.cross(plane[:1], plane[1:])),
+    ):
+        axes = {symbol: c for c in own if (symbol := columns.symbol_of(c) or "") in {kind + axis for axis in "xyz"}}
+        several = sum((columns.symbol_of(c) or "") in axes for c in own) > len(axes)
+        if len(axes) < len(_AXES) or several or len({c.unit for c in axes.values()}) > 1:
+            continue
+        parts = [axes[kind + axis] for axis in _AXES]
+        in_file = np.column_stack([c.values for c in parts])
+        kept = [c for c in kept if not any(c is part for part in parts)]
+        kept += [RawColumn(_PROJECTED[n], n, parts[0].unit, in_file @ d) for n, d in zip(names, directions, strict=True)]
+        words = (f"({' '.join(f'{value + 0.0:+.3f}' for value in np.round(d, 3) + 0.0)})" for d in directions)
+        names_of = ", ".join(sorted(c.name for c in parts))
+        notes.append(f"{said}: {names_of} are taken in the axes of the markers; {_SAID[kind].format(*words)}")
+    return kept, notes
