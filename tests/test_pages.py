@@ -191,7 +191,7 @@ SYMBOLS = {
     "notebook": ["m is the mass of a segment"],
     "history": ["m is the mass of a segment, ℓ the distance", "p is the probability of a difference at least as large without a change"],
     "cohort": ["Between and within are the standard deviations of subjects and of their sessions"],
-    "gap": ["q1 and q2: the angle of joint 1", "Fz: the contact force upward", "In formulas R is the torque with which a joint resists"],
+    "gap": ["q1 and q2: the angle of joint 1", "Fz: the contact force upward", "In formulas, R is the torque with which a joint resists"],
 }
 
 
