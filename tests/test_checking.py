@@ -190,6 +190,18 @@ def test_a_trial_that_is_missing_is_named_by_its_entry(model: bool, session: Pat
     assert problem.text.endswith("and 5 more: [[trial]] 1 of dataset.toml, file: found no such file, allowed a file that exists")
 
 
+@pytest.mark.parametrize("role", ["fit", "test"])
+def test_a_trial_without_samples_is_told(role: str, session: Path, tmp_path: Path) -> None:
+    """It was passed over: a fit trial that every verb refuses, and a test trial that is left out."""
+    folder = changed(session, tmp_path / "set", {})
+    entry = next(t for t in armrs.load_dataset(folder).trials if t.role == role)
+    path = folder / entry.file
+    path.write_text(path.read_text(encoding="utf-8").splitlines()[0] + "\n", encoding="utf-8")
+    [told] = [p for p in check_dataset(folder).problems if "no samples below the header" in p.text]
+    assert told.level == ("error" if role == "fit" else "warning") and entry.file in told.text
+    assert role == "fit" or told.next_step == "record this movement again, or remove its [[trial]]"
+
+
 def test_the_next_step_fits_the_cell(session: Path, tmp_path: Path) -> None:
     """Of a decimal comma and of a column that stands twice it was: correct its unit, its sign, or its values."""
     folder = changed(session, tmp_path / "set", {"slow_1": same, "slow_2": same})

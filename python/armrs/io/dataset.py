@@ -233,10 +233,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         trial_path = folder / entry.file
         reading = read_entry(trial_path, entry, model.n_joints, description)
         if reading is None:
-            refusal = BadInput("file", Text("no samples below the header"), f"at least {FEWEST_SAMPLES} samples")
-            if entry.role == "fit":
-                raise refusal.within(file=trial_path)
-            warnings.append(f"{refusal.within(file=entry.file)}: this test trial is left out")
+            warnings.append(left_out(entry))
             continue
         trials.append(reading.trial)
         warnings += [f"{entry.file}: {line}" for line in reading.warnings]
@@ -269,9 +266,9 @@ def described_model(folder: Path, description: Description) -> Model:
 
 
 def read_entry(path: Path, entry: TrialEntry, n_joints: int, description: Description) -> Reading | None:
-    """Return the trial of an entry as it was read, None without samples; a refusal names its file."""
+    """Return the trial of an entry as it was read, None for a test trial without samples; a refusal names its file."""
     try:
-        return read_trial(
+        reading = read_trial(
             path,
             n_joints=n_joints,
             force_on=description.force_on,
@@ -283,6 +280,18 @@ def read_entry(path: Path, entry: TrialEntry, n_joints: int, description: Descri
         )
     except BadInput as error:
         raise (_missing(path, entry, description) if error.found is NO_FILE else error.within(file=path)) from None
+    if reading is None and entry.role == "fit":
+        raise _empty(path)
+    return reading
+
+
+def left_out(entry: TrialEntry) -> str:
+    """Return the warning of a test trial without samples."""
+    return f"{_empty(entry.file)}: this test trial is left out"
+
+
+def _empty(file: str | Path) -> BadInput:
+    return BadInput("file", Text("no samples below the header"), f"at least {FEWEST_SAMPLES} samples", file=file)
 
 
 def _missing(path: Path, entry: TrialEntry, description: Description) -> BadInput:

@@ -16,10 +16,10 @@ import numpy as np
 from .. import checks
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
-from ..io.dataset import NO_MODEL, Dataset, describe, described_model, name_of, read_entry, refuse_other_arms
+from ..io.dataset import NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
 from ..io.samples import NUMBER, header_of
-from ..io.trial import Trial, moving_bases, still_angles
-from ..model import Description, Model
+from ..io.trial import Reading, Trial, moving_bases, still_angles
+from ..model import Description, Model, TrialEntry
 from ..report.tables import how_many
 from ..tabular import Tabular, Tidy
 from . import setup
@@ -221,6 +221,7 @@ _WARNINGS = (
     ("saturated", "record with a larger range of the sensor, or leave these trials out"),
     ("hand and handle", "check the bases and lengths of arm and robot in the model, and the zeros of their angles"),
     ("no samples from", "fill the gap or record the movement again; where it was, nothing is compared"),
+    ("no samples below", "record this movement again, or remove its [[trial]]"),
     ("samples are missing", "record these repeats again, or leave them out"),
     ("bridged", "look for lost samples in the recorder"),
     ("whole turns", "nothing, if the joint did not turn round"),
@@ -300,11 +301,18 @@ def _trials(folder: Path, description: Description, model: Model | None, problem
             joints: int | None = model.n_joints
         else:
             joints = _caught(partial(_joints_of, path), problems)
-        reading = None if joints is None else _caught(partial(read_entry, path, entry, joints, description), problems)
-        if reading is not None and model is not None:
+        reading = None if joints is None else _caught(partial(_read_or_left_out, path, entry, joints, description), problems)
+        if isinstance(reading, str):
+            problems.append(_warned(reading))
+        elif reading is not None and model is not None:
             problems += [_warned(f"{path}: {line}") for line in reading.warnings]
             trials.append(reading.trial)
     return trials
+
+
+def _read_or_left_out(path: Path, entry: TrialEntry, joints: int, description: Description) -> Reading | str:
+    """Return the trial of an entry as it was read, or the warning of one without samples."""
+    return read_entry(path, entry, joints, description) or left_out(entry)
 
 
 def _joints_of(path: Path) -> int:
