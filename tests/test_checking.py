@@ -202,6 +202,12 @@ def test_a_trial_without_samples_is_told(role: str, session: Path, tmp_path: Pat
     assert role == "fit" or told.next_step == "record this movement again, or remove its [[trial]]"
 
 
+def test_a_folder_without_a_data_set_is_another_folder(tmp_path: Path) -> None:
+    """The next step was to correct the file, or its name in a dataset.toml that is not there."""
+    [told] = check_dataset(tmp_path).problems
+    assert told.next_step == "give the folder that armrs import, record or demo wrote"
+
+
 def test_the_next_step_fits_the_cell(session: Path, tmp_path: Path) -> None:
     """Of a decimal comma and of a column that stands twice it was: correct its unit, its sign, or its values."""
     folder = changed(session, tmp_path / "set", {"slow_1": same, "slow_2": same})

@@ -187,7 +187,7 @@ def _remedy(error: ArmrsError) -> str:
     """Return the next step about an error."""
     if not isinstance(error, BadInput):
         return "correct the file that it names"
-    if (error.hint or error.allowed).endswith("or that file"):
+    if (error.hint or error.allowed).endswith("or that file") or "no data set" in str(error.found):
         return "give the folder that armrs import, record or demo wrote"
     if str(error.found).startswith(("no column for", "neither forces nor torques")):
         return "add the column, or give this name to the one that holds it"
