@@ -12,7 +12,7 @@ import pytest
 
 HEAVY = ("numpy", "scipy", "pyarrow", "matplotlib", "jinja2", "rich", "armrs._armrs", "lxml", "sqlite3", "distributed")
 """What costs more than a hundredth of a second to load."""
-HELP = {"armrs", "armrs.errors", "armrs.io", "armrs.io.files", "armrs.report", "armrs.report.console"}
+HELP = {"armrs", "armrs.errors", "armrs.interruptible", "armrs.io", "armrs.io.files", "armrs.report", "armrs.report.console"}
 """The modules of this package that any help text needs, beside those of `armrs.cli`."""
 
 MODEL = """
