@@ -159,6 +159,15 @@ def read_in(held_in: str) -> tuple[float, str]:
     return (1.0, unit(held_in)) if degrees is None else (math.degrees(1.0), degrees)
 
 
+def with_unit(written: str, held_in: str) -> str:
+    """Return a number as written, with its unit: that of an angle stands at the number.
+
+    >>> with_unit("0.57", "°"), with_unit("0.16", "N"), with_unit("2", "")
+    ('0.57°', '0.16 N', '2')
+    """
+    return f"{written}{'' if held_in == '°' else ' '}{held_in}".rstrip()
+
+
 def number(value: float | None, std: float | None) -> str:
     """Write a value with the digits that its standard deviation leaves meaningful, at least two."""
     if value is None:

@@ -11,6 +11,7 @@ import numpy as np
 from ..._armrs import Missing, Suspect
 from ...report import plotting
 from ...report.figures import Drawn, Figures, slug
+from ...report.tables import read_in
 from . import maps
 from .core_input import channel_names, is_led
 from .found import GapFound
@@ -216,7 +217,7 @@ def _name_of(number: int, effect: Missing) -> str:
 
 
 def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:
-    factor, unit = {"angle": (180.0 / np.pi, "°"), "speed": (180.0 / np.pi, "°/s")}.get(seen.against, (1.0, "s"))
+    factor, unit = read_in({"angle": "rad", "speed": "rad/s"}.get(seen.against, "s"))
     x = seen.x * factor
     there = np.isfinite(seen.data)
     grey: dict[str, Any] = {"ms": 4, "color": plotting.GREY, "ecolor": plotting.SILVER, "elinewidth": 3}

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...catalogue import catalogue, title
-from ...report.tables import digits, number, read_in
+from ...report.tables import digits, number, read_in, with_unit
 
 OPEN = 1.5
 """A channel is open as a whole where its gap exceeds so many times its floor."""
@@ -211,8 +211,7 @@ def with_interval(parameter: str, value: Mapping[str, Any]) -> str:
     """Return a value with its name and unit, and the ends of its interval where it has one, to one digit of its standard deviation."""
     factor, held_in = read_in(value["unit"])
     coarse = value["std"] and 10.0 * factor * value["std"]
-    beside = "" if held_in == "°" else " "
-    text = f"{parameter} {number(factor * value['value'], coarse)}{beside}{held_in}".rstrip()
+    text = f"{parameter} {with_unit(number(factor * value['value'], coarse), held_in)}"
     if coarse is None or not value.get("interval"):
         return text
     low, high = (number(factor * end, coarse) for end in value["interval"])
@@ -267,8 +266,7 @@ def amount(name: str, value: float | None) -> str:
     ('0.16 N', '0.57°')
     """
     factor, called = shown_in(name)
-    number = "–" if value is None else digits(factor * value, 2)
-    return f"{number}{'' if called == '°' else ' '}{called}"
+    return with_unit("–" if value is None else digits(factor * value, 2), called)
 
 
 def spoken(name: str) -> str:

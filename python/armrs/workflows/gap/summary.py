@@ -12,7 +12,7 @@ from ...catalogue import Kind, catalogue, title
 from ...report import plotting
 from ...report.figures import Drawn
 from ...report.sketch import sketch
-from ...report.tables import number, read_in, spread
+from ...report.tables import number, read_in, spread, with_unit
 from .found import GapFound
 from .headline import largest, left, only_near, place_of, shown_in, still_open
 
@@ -158,9 +158,8 @@ def shrinking(result: GapFound, gaps: Mapping[str, ChannelGap], ax: Axes) -> Non
 def _change(name: str, seen: Sequence[tuple[str, float]], one: float, *, opened: bool) -> str:
     """Return what is fitted and what is left, `2.4 → 0.16 N`; `seen` are the steps in units of `one`."""
     factor, held_in = shown_in(name)
-    text = held_in if held_in == "°" else f" {held_in}"
     ends = [f"{v:.2g}" if v < 99.5 else f"{v:.0f}" for v in (value * one * factor for step, value in seen if step != "before")]
-    return " → ".join(ends) + text + ("  open" if opened else "")
+    return with_unit(" → ".join(ends), held_in) + ("  open" if opened else "")
 
 
 def _legend(ax: Axes, steps: list[str], *, floors: bool) -> None:
