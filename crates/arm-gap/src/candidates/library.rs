@@ -15,6 +15,7 @@ use crate::data::session::{ComparisonMode, Session};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::{Columns, Rows};
+use crate::trial_specific::component::SLOWEST_RHYTHM;
 
 /// All candidates of a session with their responses; those that the movements do not excite are left out.
 pub struct Library {
@@ -262,7 +263,9 @@ fn ask<const N: usize>(
             }
             shape
         };
-        shapes = waves.iter().map(shape).collect();
+        // The robot and the shoulder swing slowly, muscles do not.
+        let occurs = |wave: &&[f64; 2]| nature != Nature::Rhythm || wave[0] >= SLOWEST_RHYTHM;
+        shapes = waves.iter().filter(occurs).map(shape).collect();
     }
     let joint = plain.index.min(N - 1);
     let angles = || extent(movements.iter().flat_map(|m| &m.motion).map(|m| m.q[joint]));

@@ -12,7 +12,7 @@ use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
-use crate::trial_specific::component::{TrialSpecific, shapes_of};
+use crate::trial_specific::component::{SLOWEST_RHYTHM, TrialSpecific, shapes_of};
 use crate::trial_specific::spectral_line::SpectralLine;
 use arm_numerics::signal::spectrum::{Sum, line};
 
@@ -27,8 +27,6 @@ pub enum Line {
     InPhase,
 }
 
-/// Slowest rhythm of muscles \[Hz\]: below it movements have power of their own.
-const SLOWEST_RHYTHM: f64 = 2.0;
 /// Slowest ripple of the robot \[Hz\].
 const SLOWEST_RIPPLE: f64 = 0.4;
 /// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.

@@ -1,6 +1,6 @@
 //! The catalogue as questions: what each costs, where it is asked, and what it finds.
 
-use arm_core::effect::{Effect, KINDS, Kind, Place};
+use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
 use arm_gap::candidates::candidate::{THRESHOLD, price};
 use arm_gap::candidates::library::Library;
 use arm_gap::data::prepared_session::PreparedSession;
@@ -68,4 +68,20 @@ fn a_spring_at_two_rest_angles_is_one_spring_between_them() {
     assert_eq!(found.parameters[spring.free[0]], 4.0);
     assert!((found.parameters[rest] - (middle + 0.25)).abs() < 1e-12);
     assert!(library.candidates.iter().all(|c| c.effect.index == 1));
+}
+
+/// A wave of 0.3 Hz may be the robot's or the shoulder's; one of 2.5 Hz may also be a tremor.
+#[test]
+fn no_rhythm_of_muscles_is_slower_than_two_hertz() {
+    let session = session(&[], (1e-3, 0.1));
+    let prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let point = prepared.linearize(&session.given()).expect("a run");
+    let natures = |frequency: f64| {
+        let library = Library::build(&prepared, &point, Some([frequency, 0.4]));
+        let candidates = library.expect("questions").candidates;
+        let has = |nature| candidates.iter().any(|c| c.kind().prior().nature == nature);
+        [Nature::Periodic, Nature::Rhythm].map(has)
+    };
+    assert_eq!(natures(0.3), [true, false]);
+    assert_eq!(natures(2.5), [true, true]);
 }
