@@ -15,6 +15,8 @@ const SMOOTHING: [f64; 4] = [0.0, 0.003, 0.01, CREEP];
 /// The same where little is left and a speed need only be simulated. Two neighbours differ by less than a factor of two: between 0.01 and
 /// 0.03 rad/s a friction of 0.25 N m misses forces of 0.2 N.
 const FINER: [f64; 8] = [0.0, 0.003, 0.0055, 0.01, 0.017, CREEP, 0.055, 0.1];
+/// How many speeds are tried for a dry law.
+pub(crate) const TRIED_AT_REST: usize = FINER.len();
 /// Times that each of these is chosen for all laws, at most.
 const SWEEPS: usize = 3;
 

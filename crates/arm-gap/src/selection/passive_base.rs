@@ -10,10 +10,12 @@ use arm_numerics::statistics::distributions::chi_square_tail;
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::{Library, Twin};
+use crate::data::passive_law::Passive;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
+use crate::selection::friction_at_rest::TRIED_AT_REST;
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::model_selection::{Alternative, Named, TIE};
 use crate::selection::search_state::Settled;
@@ -21,7 +23,7 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Square of the standard deviations from zero beyond which a law stays once it was refitted by simulation, 2,
 const STAYS: f64 = 4.0;
-/// and what it must gain to be named, 3: with nine such laws an arm without any has a false name in one of eighty sessions.
+/// and what it must gain at least to be named, 3: with nine such laws an arm without any has a false name in one of eighty sessions.
 pub(crate) const NAMED: f64 = 9.0;
 /// What speaks for a law that every passive joint has against one that few have, in units of twice the log-likelihood: odds of 20.
 const ODDS: f64 = 6.0;
@@ -34,8 +36,26 @@ const TURNS: usize = 4;
 struct Term {
     /// Its place in the base.
     base: usize,
+    /// Standard deviation of its first parameter.
+    sd: f64,
     /// Square of its first parameter in standard deviations.
     gain: f64,
+}
+
+impl Term {
+    /// What its law must gain to be named, in units of twice the log-likelihood: more than chance does with any of the speeds below which
+    /// dry friction may creep, and so much that a size, of which only a typical one is known beforehand, is likelier than none. Of a size
+    /// that is a small part of the typical one, the latter is more.
+    fn least_to_be_named(&self, law: &Passive) -> f64 {
+        let tried = match law.effect.kind.smoothed_by() {
+            Some(_) => TRIED_AT_REST as f64,
+            None => 1.0,
+        };
+        let typical = law.free.iter().find(|f| f.parameter == 0).map(|f| f.sd);
+        // The Bayes factor of a half-normal density of that width, to Laplace's approximation.
+        let likelier = typical.map_or(0.0, |width| 2.0 * libm::log(0.5 * width / self.sd));
+        f64::max(NAMED, likelier) + 2.0 * libm::log(tried)
+    }
 }
 
 /// A law of the passive base that is named.
@@ -93,6 +113,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     let ratio = fitted.hypothesis.get(c.target) / sd;
                     Some(Term {
                         base: e - first,
+                        sd: *sd,
                         gain: ratio * ratio,
                     })
                 }
@@ -139,13 +160,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Drops the weakest law of each joint that stands out too little; whether there was one.
     ///
     /// * `least` - what a law must gain to stay
-    fn dropped_weak(&mut self, terms: &[Term], least: impl Fn(&Effect<f64>) -> f64) -> bool {
-        let law = |t: &Term| &self.session.base[t.base].effect;
+    fn dropped_weak(&mut self, terms: &[Term], least: impl Fn(&Term, &Passive) -> f64) -> bool {
+        let law = |t: &Term| &self.session.base[t.base];
         let mut weak = Vec::new();
         for j in 0..N {
             let own = terms
                 .iter()
-                .filter(|t| law(t).index == j && t.gain < least(law(t)));
+                .filter(|t| law(t).effect.index == j && t.gain < least(t, law(t)));
             weak.extend(own.min_by(|a, b| a.gain.total_cmp(&b.gain)).map(|t| t.base));
         }
         for &b in &weak {
@@ -163,7 +184,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for _ in 0..TURNS {
             let terms = self.base_terms(&settled.1, &settled.0)?;
             self.start = Some(settled.0.hypothesis.clone());
-            if !self.dropped_weak(&terms, |_| STAYS) {
+            if !self.dropped_weak(&terms, |_, _| STAYS) {
                 break;
             }
             self.read_anew()?;
@@ -211,7 +232,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             let terms = self.base_terms(&point, &fitted)?;
             let crossed = crossed_joints::<N>(&fitted.hypothesis.named);
-            if !self.dropped_weak(&terms, |law| least_of(law, &crossed, STAYS)) {
+            if !self.dropped_weak(&terms, |_, law| least_of(&law.effect, &crossed, STAYS)) {
                 let back = std::iter::zip(&before, &self.dropped).any(|(was, is)| *was && !is);
                 if (back || is_bent) && fitted.cost + fitted.enough() < current.cost {
                     return Ok(Some((fitted, point)));
@@ -300,7 +321,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         loop {
             let terms = self.base_terms(&settled.1, &settled.0)?;
             let crossed = crossed_joints::<N>(&settled.0.hypothesis.named);
-            if self.dropped_weak(&terms, |law| least_of(law, &crossed, NAMED * scale)) {
+            let least = |term: &Term, law: &Passive| {
+                least_of(&law.effect, &crossed, term.least_to_be_named(law) * scale)
+            };
+            if self.dropped_weak(&terms, least) {
                 let start = self.without_dropped(settled.0.hypothesis);
                 settled = self.settle(start, settled.0.asked)?;
                 continue;
@@ -543,6 +567,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::passive_law::Free;
 
     #[test]
     fn a_spring_over_two_joints_keeps_the_springs_of_the_joint_it_is_named_after_and_of_the_one_before()
@@ -556,6 +581,38 @@ mod tests {
         );
         assert_eq!(least_of(&of(Kind::Elastic, 2), &crossed, NAMED), NAMED);
         assert_eq!(least_of(&of(Kind::Viscous, 0), &crossed, NAMED), NAMED);
+    }
+
+    #[test]
+    fn a_law_of_a_small_part_of_its_typical_size_must_gain_more_to_be_named() {
+        let law = |kind, typical: f64| Passive {
+            effect: Effect::new(kind, 0),
+            free: vec![Free::expected((0, [0.0, typical]))],
+            likely: true,
+        };
+        let least = |kind, sd| {
+            Term {
+                base: 0,
+                sd,
+                gain: 0.0,
+            }
+            .least_to_be_named(&law(kind, 1.0))
+        };
+        // At 3 and at √(2 ln 500) standard deviations.
+        assert_eq!(least(Kind::Viscous, 0.1), NAMED);
+        assert!((least(Kind::Viscous, 1e-3) - 12.43).abs() < 0.01);
+        // Of dry friction, eight speeds are tried.
+        assert!((least(Kind::Coulomb, 0.1) - NAMED - 2.0 * libm::log(8.0)).abs() < 1e-12);
+        // Where the limit is the one of likelihood, the half-normal density and the likelihood have equal areas: by sums over sizes.
+        let (sd, width) = (1e-3, 1.0);
+        let found = sd * least(Kind::Viscous, sd).sqrt();
+        let density = |x: f64, sd: f64| libm::exp(-0.5 * x * x / (sd * sd)) / sd;
+        let sizes = (0..200_000).map(|i| 1e-7 * f64::from(i));
+        let with: f64 = sizes
+            .map(|x| 2e-7 * density(found - x, sd) * density(x, width))
+            .sum();
+        let none = density(found, sd) * libm::sqrt(core::f64::consts::TAU);
+        assert!((with / none - 1.0).abs() < 0.01, "{}", with / none);
     }
 
     /// Of nine laws, each with a first parameter that is not negative, chance names one in 80 sessions; a rare law has odds of 20 against it.
