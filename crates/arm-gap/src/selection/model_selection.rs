@@ -37,6 +37,8 @@ const CLEAR_EXCHANGES: usize = 16;
 /// Part of what a law misses that an effect in another place can stand for: what misses acts in the joint of the law, and seldom
 /// looks like something else.
 const ELSEWHERE: f64 = 0.25;
+/// The same of what swings there: it has one frequency and is alike in every movement, and what a law misses is neither.
+const SWINGING: f64 = 0.05;
 
 /// What an effect may explain, as a sum of squares, without being there: what the law of another one misses of what it shows.
 ///
@@ -48,7 +50,12 @@ fn mimicked(effect: &Effect<f64>, by: &Effect<f64>, gain: f64) -> f64 {
     };
     let (own, other) = (joints(effect), joints(by));
     let is_near = own.start < other.end && other.start < own.end;
-    by.kind.prior().missed * gain * if is_near { 1.0 } else { ELSEWHERE }
+    let part = match (is_near, effect.kind.prior().nature.swings()) {
+        (true, _) => 1.0,
+        (false, false) => ELSEWHERE,
+        (false, true) => SWINGING,
+    };
+    by.kind.prior().missed * gain * part
 }
 
 /// The most that an effect may explain without being there beside named ones that together explain so much: each by itself what it gained when
@@ -489,6 +496,8 @@ mod tests {
         // A spring over joints 1 and 2 acts in both, a bias of the sensor in none.
         assert_eq!(in_joint(Kind::Biarticular, 1), 1000.0 * missed);
         assert_eq!(in_joint(Kind::ForceBias, 0), 7.5);
+        // A ripple of the robot is alike in every movement, which what a law misses is not.
+        assert_eq!(in_joint(Kind::RobotRipple, 0), 1.5);
         // An exact law misses next to nothing.
         let spring = Effect::<f64>::new(Kind::Elastic, 1);
         assert!(mimicked(&friction, &spring, 1000.0) <= 0.02);
