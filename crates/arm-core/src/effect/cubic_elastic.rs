@@ -20,7 +20,7 @@ impl Law for CubicElastic {
     };
     const TITLE: Option<&'static str> = Some("cubic spring");
     const PRIOR: Prior =
-        Prior::lasting(&[Part::of(&[0]).shaped(&[(1, Values::Middle)]).varying(&[1])])
+        Prior::lasting(&[Part::of(&[0]).shaped(&[(1, Values::Across)]).varying(&[1])])
             .missing(0.002)
             .typically(2.0);
 

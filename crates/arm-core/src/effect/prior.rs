@@ -136,6 +136,8 @@ pub enum Values {
     Lowest,
     /// The middle between them.
     Middle,
+    /// All three.
+    Across,
 }
 
 impl Part {

@@ -229,7 +229,9 @@ fn values_and_rest_angles_fit_their_parameters() {
                 let parameter = &kind.info().parameters[*i];
                 let fits = match values {
                     Values::Each(values) => values.iter().all(|&v| parameter.allows(v)),
-                    Values::Highest | Values::Lowest | Values::Middle => parameter.unit == "rad",
+                    Values::Highest | Values::Lowest | Values::Middle | Values::Across => {
+                        parameter.unit == "rad"
+                    }
                 };
                 assert!(fits, "{kind:?}: {values:?} for {}", parameter.name);
             }

@@ -276,6 +276,7 @@ fn ask<const N: usize>(
             Values::Highest => vec![high],
             Values::Lowest => vec![low],
             Values::Middle => vec![0.5 * (low + high)],
+            Values::Across => vec![low, 0.5 * (low + high), high],
         };
         let shaped = |mut shape: Effect<f64>, value: f64| {
             shape.parameters[*p] = value;
