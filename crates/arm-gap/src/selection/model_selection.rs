@@ -410,7 +410,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 Some((part, choice, (score_test, &as_fitted)))
             });
             let both = choice.into_iter().chain(stand_in);
-            singles.extend(both.filter(|(part, ..)| *part > RIVAL));
+            // The members of a family are held against each other whatever they show to first order: their shapes are refined first.
+            let is_kin = own.is_of_family_in_joint(&library.candidates[c].effect);
+            singles.extend(both.filter(|(part, ..)| is_kin || *part > RIVAL));
         }
         singles.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best of each effect.
