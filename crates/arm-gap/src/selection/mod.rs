@@ -9,6 +9,7 @@ pub mod lack_of_fit;
 pub mod model_discrimination;
 pub mod model_selection;
 pub mod passive_base;
+mod passive_base_evidence;
 pub mod score_test;
 pub mod score_variance;
 pub mod search;

@@ -8,9 +8,9 @@ use crate::candidates::candidate::price;
 /// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
 /// what a model lacks of them reach that far.
 pub(crate) const SLOW: f64 = 3.0;
-/// Slowest rhythm of muscles \[Hz\]: tremors below 4 Hz are called slow (Deuschl, Bain, Brin 1998), and below 2 Hz movements have
-/// power of their own, of which what a model misses is no rhythm.
-pub(crate) const SLOWEST_RHYTHM: f64 = 2.0;
+/// Slowest rhythm of muscles \[Hz\]: the slowest tremor that is known, myorhythmia, has 1 to 4 Hz. What swings more slowly is the robot or the
+/// shoulder, or what a model misses of the movement.
+pub(crate) const SLOWEST_RHYTHM: f64 = 1.0;
 
 /// An effect that stands apart from the fit of all trials.
 #[derive(Clone, Debug)]

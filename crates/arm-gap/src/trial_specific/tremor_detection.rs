@@ -12,7 +12,7 @@ use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
-use crate::trial_specific::component::{SLOWEST_RHYTHM, TrialSpecific, shapes_of};
+use crate::trial_specific::component::{TrialSpecific, shapes_of};
 use crate::trial_specific::spectral_line::SpectralLine;
 use arm_numerics::signal::spectrum::{Sum, line};
 
@@ -27,6 +27,8 @@ pub enum Line {
     InPhase,
 }
 
+/// Slowest line of a rhythm of muscles \[Hz\]: below it movements have power of their own.
+const SLOWEST_LINE: f64 = 2.0;
 /// Slowest ripple of the robot \[Hz\].
 const SLOWEST_RIPPLE: f64 = 0.4;
 /// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
@@ -76,9 +78,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         let all: Vec<&Channels> = told.as_ref().unwrap_or(&residuals).iter().collect();
         // A robot mostly starts its movements in the same phase of what shakes it.
         let (lowest, sums) = match place {
-            Line::BetweenRepeats => (SLOWEST_RHYTHM, &[Sum::Powers][..]),
+            Line::BetweenRepeats => (SLOWEST_LINE, &[Sum::Powers][..]),
             Line::OfTheRobot => (SLOWEST_RIPPLE, &[Sum::Swings, Sum::Powers][..]),
-            Line::InPhase => (SLOWEST_RHYTHM, &[Sum::Swings][..]),
+            Line::InPhase => (SLOWEST_LINE, &[Sum::Swings][..]),
         };
         let lines = sums.iter().filter_map(|sum| line(&all, rate, lowest, *sum));
         let named = |frequency: f64| self.swinging_at(frequency, (point, &residuals));
