@@ -149,6 +149,15 @@ def test_the_documented_thresholds_are_those_of_the_code() -> None:
     assert said == {"4.8"}
 
 
+def test_a_trial_that_no_fit_has_seen_is_called_a_test_trial() -> None:
+    """README, gallery and notebooks called it held out, the gap workflow kept apart."""
+    pages = [ROOT / "README.md", *ROOT.glob("docs/*.md"), *ROOT.glob("examples/notebooks/*.ipynb")]
+    texts = [*pages, *(path for path in ROOT.glob("python/armrs/**/*") if path.suffix in {".py", ".pyi", ".j2"})]
+    other = re.compile(r"held[- ]out|kept apart", flags=re.I)
+    assert {path.relative_to(ROOT).as_posix() for path in texts if other.search(path.read_text(encoding="utf-8"))} == set()
+    assert "\n| test trial |" in (ROOT / "docs" / "gap.md").read_text(encoding="utf-8")
+
+
 def test_nalgebra_is_said_to_do_what_it_does() -> None:
     """It "serves as a container" stood beside its Cholesky factorisation."""
     methods = {"cholesky": "Cholesky", "try_inverse": "inverse", "lu": "LU", "qr": "QR", "svd": "singular", "symmetric_eigen": "eigen"}

@@ -244,7 +244,7 @@ def record(
     apart = (
         ""
         if any(run.tests for run in planned.runs)
-        else "; tests = 1 in [[movement]] records a trial that is kept apart to test the result on"
+        else "; tests = 1 in [[movement]] records a test trial, which no fit uses"
     )
     worn = ", ".join(run.configuration for run in planned.runs if run.worn)
     alike = f"remove [[added]] and the trials of {worn} from {quoted(out / 'dataset.toml')}, then " if worn else ""

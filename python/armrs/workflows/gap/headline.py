@@ -104,7 +104,7 @@ def only_near(result: Mapping[str, Any]) -> bool:
 
 
 def headline(result: Mapping[str, Any]) -> str:
-    """Return the answer in one sentence: what the model lacks, and what that does to the gap on trials that were kept apart."""
+    """Return the answer in one sentence: what the model lacks, and what that does to the gap on the test trials."""
     joints, effects = result["data"]["joints"], by_joint(result)
     opened, unexplained = still_open(result), result["verdict"] == "unexplained"
     tested = result["lack_of_fit"]["amended"]["z"] is not None
