@@ -10,7 +10,7 @@ from typing import Any
 from ..._armrs import MISFIT
 from ...report import tables
 from ...report import words as common
-from ...report.tables import Table, digits, number, smallest_effects, spread
+from ...report.tables import Table, digits, number, smallest_effects, spread, with_interval
 from . import headline
 from .headline import effect_name, joined
 
@@ -25,7 +25,7 @@ _BETTER = 10.0
 def size(effect: Mapping[str, Any]) -> str:
     """Return the size of an effect with its interval."""
     name = headline.largest(effect["parameters"]) or next(iter(effect["parameters"]))
-    return headline.with_interval(name, effect["parameters"][name])
+    return f"{name} {with_interval(effect['parameters'][name])}"
 
 
 def chance(effect: Mapping[str, Any]) -> str:
