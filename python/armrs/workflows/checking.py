@@ -200,7 +200,7 @@ def _remedy(error: ArmrsError) -> str:
         return "write decimal points, or import the recording again: armrs import reads decimal commas"
     if str(error.found).endswith(" twice"):
         return "rename or remove one of the two"
-    if "dead sensor" in (error.hint or ""):
+    if "dead sensor" in f"{error.hint} {error.allowed}":
         return "repair the sensor and record again, or leave the trial out of dataset.toml"
     if error.allowed == NUMBER and isinstance(error.found, str):
         return "leave the cell empty where the sample is missing"
@@ -260,20 +260,21 @@ _COLUMN = re.compile(r"\bcolumn (\w+)(?=:| jumps)")
 def _not_implied(problems: Iterable[Problem]) -> list[Problem]:
     """Return problems without what only follows from an error.
 
-    Of columns that hold something else, and of dead sensors, no weight can be told. What columns probably hold is told once, whether the
-    robot's handle or the balance of the arm shows it.
+    Of columns that hold something else, and of dead sensors, no weight can be told; and a dead sensor is no joint that is held. What
+    columns probably hold is told once, whether the robot's handle or the balance of the arm shows it.
     """
     told = list(problems)
     errors = [p.text for p in told if p.level == "error"]
     misread = any(words in text for text in errors for words in _MISREAD)
-    dead = any("dead sensor" in text for text in errors)
-    implied = _OF_VALUES if misread else _OF_FORCES if dead else ()
+    dead = [text.partition(": found ")[0] for text in errors if "dead sensor" in text]
+    angles = {name for place in dead for name in re.findall(r"\bq\d", place)}
+    implied = _OF_VALUES if misread or angles else _OF_FORCES if dead else ()
     by_handle = {text.partition(", allowed ")[2] for text in errors if _MISREAD[1] in text}
 
     def follows(p: Problem) -> bool:
         if p.level == "error":
             return _MISREAD[0] in p.text and p.text.partition(", allowed ")[2] in by_handle
-        return any(words in p.text for words in implied)
+        return any(words in p.text for words in implied) or p.text.partition(" is ")[0] in angles
 
     return [p for p in told if not follows(p)]
 

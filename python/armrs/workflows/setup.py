@@ -209,7 +209,7 @@ def _ranked(model: Model, motion: Motion, met: bool) -> list[tuple[float, Readin
     """Return what every other reading leaves, the least first; of the forces alone where the angles are known to be right."""
     n = model.n_joints
     asked = [*readings.of_forces(n)] if met else [*readings.of_angles(n), *readings.of_forces(n)]
-    return sorted(((unexplained(model, motion.read_as(r)), r) for r in asked), key=lambda item: item[0])
+    return sorted(((unexplained(model, motion.read_as(r)), r) for r in asked if r.differs(motion.q)), key=lambda item: item[0])
 
 
 def _motion(trials: Sequence[Trial], samples: int = SAMPLES) -> Motion | None:
@@ -236,4 +236,4 @@ def _other_zero(model: Model, motion: Motion) -> tuple[float, Reading] | None:
     least, joint, offset = min(found)
     if abs(offset) < OTHER_ZERO or (joint == 1 and abs(abs(offset) - np.pi / 2) < OTHER_ZERO):
         return None
-    return least, readings.other_zero(n, joint, offset)
+    return least, readings.other_zero(n, joint, offset, still=constant(motion.q[:, joint - 1]) is not None)
