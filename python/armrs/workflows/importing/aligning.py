@@ -79,8 +79,8 @@ def settled(
     if apart and not problems:
         if len(apart) > 1:
             reads = _matched(reads, apart, channels, model, given)
-        reads, lines, doubts = _refined(reads, channels, _decided(reads, channels, model, given, []), model)
-    return list(reads), _decided(reads, channels, model, given, problems), lines, doubts
+        reads, lines, doubts = _refined(reads, channels, _decided(reads, channels, model, given, [], []), model)
+    return list(reads), _decided(reads, channels, model, given, problems, doubts), lines, doubts
 
 
 def _matched(
@@ -127,10 +127,15 @@ def _refined(
 
 
 def _decided(
-    reads: Sequence[Read], channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
+    reads: Sequence[Read],
+    channels: Sequence[Channel],
+    model: Model,
+    given: Mapping[str, object],
+    problems: list[BadInput],
+    doubts: list[str],
 ) -> Convention:
     """Return the convention in which the arm balances."""
-    return conventions.decide(model, _recorded(reads, channels, model), given, problems)
+    return conventions.decide(model, _recorded(reads, channels, model), given, problems, doubts)
 
 
 def _recorded(reads: Sequence[Read], channels: Sequence[Channel], model: Model) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
