@@ -244,6 +244,19 @@ def test_worn_masses_keep_identify_and_gap_from_an_arm(session: Path, tmp_path: 
     assert found.errors[0].text.startswith(refused)
 
 
+@pytest.mark.parametrize("name", ["session", "pendulum_single", "pendulum_triple", "dfki_a0", "dfki_c1"])
+def test_check_says_of_passive_what_passive_says(name: str, request: pytest.FixtureRequest) -> None:
+    """Of free swings it said that passive can use them, which found nothing there; and whether a movement is slow had two rules."""
+    folder: Path = request.getfixturevalue("session") if name == "session" else request.getfixturevalue("data") / name
+    curves = armrs.passive_moments(folder).curves
+    assert bool(curves) == (name in {"session", "dfki_a0"})
+    [told] = [v for v in check_dataset(folder).verbs if v.verb == "passive"]
+    assert told.able == bool(curves)
+    slow, _, fast = told.why.partition("not slow")
+    for c in curves:
+        assert re.search(rf"joint {c.joint} \([^)]*{c.configuration}", slow if c.inertial_share <= 0.1 else fast), told.why
+
+
 def test_lines_that_are_no_table_are_not_a_column_to_correct(session: Path, tmp_path: Path) -> None:
     folder = changed(session, tmp_path / "set", {})
     for name, content in (("slow_1", "# made by a tool\nt_s,q1_rad\n0,0\n"), ("slow_2", "\n"), ("slow_3", "t_s,q1_rad,q2_rad\n0,0\n")):

@@ -282,16 +282,16 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     assert others(result("explained", {**DRY, "alternatives": [rival]})) == [
         "Instead of Coulomb friction in joint 2 it may be viscous damping in joint 2 (explains these movements nearly as well, by 7.1 units less)."
     ]
-    far = effect("viscous", 2, why="explains these movements as far as a law that is not exact can", worse=170.4)
+    far = effect("viscous", 2, why="explains these movements to within the possible error of the named law", worse=170.4)
     [line] = others(result("explained", {**DRY, "alternatives": [far]}))
     assert line.endswith(
-        "it may be viscous damping in joint 2 (explains these movements as far as a law that is not exact can, by 170 units less)."
+        "it may be viscous damping in joint 2 (explains these movements to within the possible error of the named law, by 170 units less)."
     )
     # What is 13 standard deviations apart already cannot be told apart only because a law may miss as much.
     asked = {"separating_movement": "lead the elbow alone", "separation": {"now": 13.0, "then": 40.0}}
     lines = others(result("explained", {**DRY, "alternatives": [{**far, **asked}]}))
-    assert lines[1].endswith("40 standard deviations apart (now 13, which the error of an inexact law may cause).")
-    assert "or by no more than an inexact law may miss: on these" in tie(result("explained", {**DRY, "alternatives": [far]}))
+    assert lines[1].endswith("40 standard deviations apart (now 13, which the error of the named law may cause).")
+    assert "or by no more than the possible error of the named law: on these" in tie(result("explained", {**DRY, "alternatives": [far]}))
     assert "log-likelihood: on these" in tie(result("explained", {**DRY, "alternatives": [rival]}))
     for worse, said in ((-729.0, "(why, by 729 units more)."), (-3.0, "(why)."), (0.05, "(why).")):
         other = effect("viscous", 2, why="why", worse=worse)

@@ -13,7 +13,11 @@ import pytest
 import armrs
 from armrs import BadInput
 from armrs.cli import main
+from armrs.io import readings
+from armrs.io.plausibility import hand_path, refuse_implausible
+from armrs.workflows.checking import grouped
 from armrs.workflows.demo import true_model
+from armrs.workflows.importing.handle import robot_angles
 
 FIRST = "trials/slow_1.csv"
 
@@ -58,7 +62,9 @@ ANGLES: dict[str, tuple[dict[str, Callable[[np.ndarray], np.ndarray]], str]] = {
 }
 STILL: dict[str, tuple[dict[str, Callable[[np.ndarray], np.ndarray]], str]] = {
     "still angle": ({"q": held(0)}, "column q1: found -1.0"),
-    "still angles": ({"q": lambda q: 0.0 * q + q[0]}, "column q1: found -1.0"),
+    "still angles": ({"q": lambda q: 0.0 * q + q[0]}, "columns q1, q2: found -1.0"),
+    "shoulder at zero": ({"q": lambda q: q * [0.0, 1.0]}, "column q1: found 0 rad in every sample, while the robot's handle moves"),
+    "elbow at zero": ({"q": lambda q: q * [1.0, 0.0]}, "column q2: found 0 rad in every sample, while the robot's handle moves"),
 }
 
 
@@ -89,9 +95,44 @@ def test_one_joint_that_is_still_may_be_held(slow_arm: Path, tmp_path: Path, cap
     assert "q2 is 0 rad in every sample of every trial: a joint that is held, or a dead sensor?" in capsys.readouterr().err
 
 
-def test_sound_data_pass(slow_arm: Path) -> None:
-    from armrs.io.plausibility import refuse_implausible
+def splinted(data: armrs.Dataset, level: float, shown: float) -> armrs.Dataset:
+    """Return a data set of which the elbow is held at an angle, where its sensor shows another, and the robot follows the hand."""
+    model, robot = data.model, data.model.robot
+    assert robot is not None
 
+    def of(trial: armrs.Trial) -> armrs.Trial:
+        q = np.column_stack([trial.q[:, 0], np.full(len(trial), level)])
+        shows = np.column_stack([trial.q[:, 0], np.full(len(trial), shown)])
+        return dataclasses.replace(trial, q=shows, robot_q=robot_angles(robot, hand_path(model, q)))
+
+    return data.replace(trials=tuple(map(of, data.trials)))
+
+
+def test_a_splinted_joint_is_no_dead_sensor(slow_arm: Path) -> None:
+    """Its angle never changes either; and where its zero is another one, that is what is wrong."""
+    data = armrs.load_dataset(slow_arm)
+    assert refusal(lambda: refuse_implausible(splinted(data, 1.0, 1.0))) is None
+    assert "(another zero: q2 is 1 rad too small?)" in str(refusal(lambda: refuse_implausible(splinted(data, 1.0, 0.0))))
+
+
+def test_a_dead_sensor_is_one_problem(slow_arm: Path, tmp_path: Path) -> None:
+    """It was told as another zero of the angle, beside a joint that is held and a hand that is apart from the handle."""
+    data = armrs.load_dataset(slow_arm)
+    armrs.write_dataset(changed(data, every=True, q=lambda q: q * [1.0, 0.0]), tmp_path / "dead")
+    problems = grouped(armrs.check_dataset(tmp_path / "dead").problems)
+    assert [p.text.partition(":")[2][:16] for p in problems if "q2" in p.text or "hand" in p.text] == [" column q2: foun"]
+    assert problems[0].next_step.startswith("repair the sensor")
+
+
+def test_without_a_robot_another_zero_of_an_angle_that_never_changes_may_be_a_dead_sensor() -> None:
+    allowed = readings.other_zero(2, 2, -0.9, still=True).allowed
+    assert "a dead sensor?" in allowed and "if the joint is held, q2 is 0.9 rad too large" in allowed
+    mirrored = next(r for r in readings.of_angles(2) if r.place == "column q2" and "mirrored" in r.allowed)
+    angles = np.array([[0.1, 0.0], [0.2, 0.0]])
+    assert mirrored.differs(angles + 0.1) and not mirrored.differs(angles)  # 0 has no side
+
+
+def test_sound_data_pass(slow_arm: Path) -> None:
     data = armrs.load_dataset(slow_arm)
     assert refusal(lambda: refuse_implausible(data)) is None
 

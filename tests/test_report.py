@@ -194,7 +194,9 @@ def test_a_figure_outside_the_folder_of_the_result_is_refused(results: Path, tmp
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("not json", "r.json: file: found Expecting value: line 1 column 1 (char 0), allowed JSON"),
+        ("[arm]\ngravity = 9.81\n", "r.json: file: found no JSON but '[arm]', allowed the JSON of a result that a verb wrote (identified"),
+        ("", "r.json: file: found an empty file, allowed the JSON of a result that a verb wrote"),
+        ('{"verb": ', "r.json: file: found broken JSON (Expecting value: line 1 column 10 (char 9)), allowed the JSON of a result"),
         ("[]", "r.json: verb: found no key verb, allowed a result of armrs identify, simulate, passive, spasticity, cohort, demo"),
         ('{"verb": "gap2"}', "r.json: verb: found 'gap2', allowed a result of armrs"),
         (

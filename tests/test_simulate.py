@@ -88,7 +88,7 @@ def test_an_accuracy_that_cannot_be_kept_is_refused(slow_arm: Path, options: dic
 
 
 def test_an_accuracy_beyond_rounding_is_refused(slow_arm: Path) -> None:
-    with pytest.raises(armrs.SimulationError, match="a shorter step than 1e-6 s is not tried"):
+    with pytest.raises(armrs.SimulationError, match="steps shorter than 1e-6 s are not tried"):
         armrs.simulate(slow_arm / "truth.toml", duration=0.2, accuracy=1e-22)
 
 

@@ -15,7 +15,7 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 import armrs
 from armrs.analysis import double_exponential
 from armrs.catalogue import catalogue
-from armrs.report import plotting, tables
+from armrs.report import clinic_words, plotting, tables
 from armrs.report import words as common
 from armrs.thesis import simulation
 from armrs.workflows import demo, identify, setup
@@ -65,6 +65,23 @@ def test_the_worth_of_an_effect_is_told_in_units_of_the_scatter() -> None:
     assert "With every effect it is 1.1." in words.worth(found)
     unrepeated = {"effects": [effect(without=None)], "lack_of_fit": {"amended": {"ratio": None}}}
     assert words.missing(unrepeated).rows[0][2] == "< 1 %" and "Share: " in words.worth(unrepeated)
+
+
+def test_sentences_write_a_value_and_its_interval_in_one_way() -> None:
+    """The sentence of a reflex had one digit more than that of a gap: above 91.7 °/s (95 % interval 88.2 to 95.1)."""
+
+    def value(mean: float, std: float, unit: str) -> dict[str, Any]:
+        return {"value": mean, "std": std, "unit": unit, "interval": [mean - 2.0 * std, mean + 2.0 * std]}
+
+    threshold = value(1.6, 0.03, "rad/s")
+    latency, way = value(0.0402, 0.0021, "s"), {"value": 1.0}
+    parameters = {"direction": way, "threshold": threshold, "gain": value(0.5012, 0.02, "N m s/rad"), "latency": latency}
+    reflex = {"joint": 1, "decided": True, "parameters": parameters}
+    assert clinic_words.verdict({"verb": "spasticity", "data": {"joints": ["elbow"]}, "effects": [reflex]}) == (
+        "elbow: a reflex resists stretch with growing angle above 92 °/s (95 % interval 88 to 95); gain 0.50 N m s/rad "
+        "(95 % interval 0.46 to 0.54); latency 40 ms (95 % interval 36 to 44)."
+    )
+    assert words.size({"parameters": {"speed": threshold}}) == "speed 92 °/s (95 % interval 88 to 95)"
 
 
 def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
@@ -147,6 +164,15 @@ def test_the_documented_thresholds_are_those_of_the_code() -> None:
     texts = [*(ROOT / "docs").glob("*.md"), *(ROOT / "crates").rglob("verdict.rs")]
     said = {v for path in texts for v in re.findall(r"(?:hidden|nulls)(?:\s|///)+reach (\d\.\d)", path.read_text(encoding="utf-8"))}
     assert said == {"4.8"}
+
+
+def test_a_trial_that_no_fit_has_seen_is_called_a_test_trial() -> None:
+    """README, gallery and notebooks called it held out, the gap workflow kept apart."""
+    pages = [ROOT / "README.md", *ROOT.glob("docs/*.md"), *ROOT.glob("examples/notebooks/*.ipynb")]
+    texts = [*pages, *(path for path in ROOT.glob("python/armrs/**/*") if path.suffix in {".py", ".pyi", ".j2"})]
+    other = re.compile(r"held[- ]out|kept apart", flags=re.I)
+    assert {path.relative_to(ROOT).as_posix() for path in texts if other.search(path.read_text(encoding="utf-8"))} == set()
+    assert "\n| test trial |" in (ROOT / "docs" / "gap.md").read_text(encoding="utf-8")
 
 
 def test_nalgebra_is_said_to_do_what_it_does() -> None:

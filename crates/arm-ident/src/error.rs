@@ -36,10 +36,10 @@ pub enum IdentError {
         allowed: f64,
     },
     /// A measured path of the first joint, which simulated motion does not follow.
-    #[error("the first joint moves: its path is taken into account along measured motion alone")]
+    #[error("the first joint moves, which is taken into account only with measured motion")]
     MovingBase,
     /// Measured muscle activity, which simulated motion does not follow.
-    #[error("muscles are active: they are taken into account along measured motion alone")]
+    #[error("muscles are active, which is taken into account only with measured motion")]
     MuscleActivity,
     /// Something about one trial.
     #[error("trial {number}: {error}")]

@@ -41,7 +41,7 @@ pub type Named<T> = indexmap::IndexMap<String, T>;
 /// What of a trial a result names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialName {
-    /// Whether it was fitted or kept apart.
+    /// Whether it is a fit trial or a test trial.
     pub role: Role,
     /// Its movement.
     pub configuration: String,

@@ -103,9 +103,9 @@ pub enum SimulationError {
         /// Zero-based joint.
         joint: usize,
     },
-    /// Friction that grows with the force through its joint so fast that it has no single answer.
+    /// Friction that grows with the force through its joint so fast that it has no unique solution.
     #[error(
-        "at {time} s the friction in joint {} has no single answer: through the joint force it can add {gain:.3} times itself to itself, allowed is less than 0.98; its coefficient is too large for this arm",
+        "at {time} s the friction torque of joint {} has no unique solution: it increases the joint force on which it depends, with a loop gain of {gain:.3}, allowed is less than 0.98; the friction coefficient is too large for this arm",
         joint + 1
     )]
     Jam {
@@ -118,7 +118,7 @@ pub enum SimulationError {
     },
     /// An accuracy that no step reaches which is not too short.
     #[error(
-        "the angles are right to within {reached:.2e} rad at a step of {dt:.3e} s, asked are {asked:e} rad, and a shorter step than 1e-6 s is not tried"
+        "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {asked:e} rad; steps shorter than 1e-6 s are not tried"
     )]
     Accuracy {
         /// Accuracy asked for \[rad\].
@@ -184,12 +184,12 @@ pub enum NoRest {
     },
     /// A maximum or a saddle of the potential energy.
     #[error(
-        "an equilibrium that is not stable, such as an upright arm; angles a few degrees beside it may do"
+        "an unstable equilibrium, such as that of an upright arm; try angles that differ by a few degrees"
     )]
     Unstable,
     /// Nothing holds a joint.
     #[error(
-        "that joint {} turns more than twice, for nothing holds it",
+        "that joint {} turns more than twice: no spring or weight holds it",
         joint + 1
     )]
     FallsAway {

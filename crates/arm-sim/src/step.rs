@@ -28,7 +28,7 @@ impl<'a, T, const N: usize> Inputs<'a, T, N> {
     }
 }
 
-/// Friction that has no single answer.
+/// Friction that has no unique solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jam {
     /// Time \[s\].

@@ -241,11 +241,7 @@ def record(
     plain = result.to_dict() | {"made_by": origin(command_line(context))}
     report = write_recorded(result, plain, out)[-1]
     console.warn(sticking_said(planned.truth))
-    apart = (
-        ""
-        if any(run.tests for run in planned.runs)
-        else "; tests = 1 in [[movement]] records a trial that is kept apart to test the result on"
-    )
+    apart = "" if any(run.tests for run in planned.runs) else "; tests = 1 in [[movement]] records a test trial, which no fit uses"
     worn = ", ".join(run.configuration for run in planned.runs if run.worn)
     alike = f"remove [[added]] and the trials of {worn} from {quoted(out / 'dataset.toml')}, then " if worn else ""
     present(lambda: plain, json, lambda: words.recorded(plain, report), f"{alike}armrs gap {quoted(out)} -o gap{apart}")

@@ -5,7 +5,7 @@ It is asked before any physics, so that a wrong column is named as such and not 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -26,8 +26,8 @@ _MET = 0.05
 """The same, up to which hand and handle meet: the angles of the arm are then taken as right."""
 _MEETS = 0.2
 """Another reading explains the columns when it brings hand and handle this much nearer."""
-_HELD = (0.002, 0.05)
-"""An angle that never changes contradicts a handle that moves against the hand by more than this [m], and by this part of its path."""
+_FOLLOWS = (0.002, 0.05)
+"""The hand follows the handle where their distance changes by at most this [m], or this part of the handle's path."""
 OTHER_ZERO = 0.2
 """A smaller error of an angle's zero [rad] may be a poor calibration, which `angle_offset` of the catalogue names."""
 _PLAINER = 0.005
@@ -74,23 +74,58 @@ def _refuse_apart(model: Model, robot: Robot, trial: Trial) -> None:
     handle = handle_path(robot, robot_q) - base
     gap = hand_path(model, q) - handle
     own = _rms(gap)
+    dead = _dead_angles(model, q, handle)
     if own > _SUSPECT * reach:
+        explained = min(_MEETS * own, 0.1 * reach, _follows(handle) if dead else np.inf)
         best, reading = _other_reading(model, robot, q, robot_q, base)
-        if best >= min(_MEETS * own, 0.1 * reach):
-            best, reading = _other_zero(model, q, handle)
-        if reading is not None and best < min(_MEETS * own, 0.1 * reach):
+        left, zero = (np.inf, None) if dead else _other_zero(model, q, handle)
+        if best >= explained or left < _MEETS * best:  # in one posture, another convention may come near
+            best, reading = left, zero
+        if reading is not None and best < explained:
             found = Text(f"angles that put the hand {own:.3g} m from the robot's handle")
             raise BadInput(reading.place, found, reading.allowed, file=trial.file)
-    path = _rms(handle - handle.mean(axis=0))
-    for j, angle in enumerate(q.T, start=1):
-        level = constant(angle)
-        if level is not None and _rms(gap - gap.mean(axis=0)) > max(_HELD[0], _HELD[1] * path):
-            found = Text(f"{level:g} rad in every sample, while the robot's handle moves as it could not then")
-            raise BadInput(f"column q{j}", found, "an angle that changes with the movement", file=trial.file, hint="a dead sensor?")
+    if dead:
+        place = f"column{'s' * (len(dead) > 1)} {', '.join(f'q{j + 1}' for j in dead)}"
+        levels = ", ".join(f"{q[0, j] + 0.0:g}" for j in dead)
+        found = Text(f"{levels} rad in every sample, while the robot's handle moves as it could not then")
+        raise BadInput(place, found, "an angle that changes with the movement", file=trial.file, hint="a dead sensor?")
     if own >= _FAR * reach:
         found = Text(f"the hand {own:.3g} m from the robot's handle")
         allowed = "angles of arm and robot that meet: lengths, bases, elbow and units of the model?"
         raise BadInput("q1 …, qr1, qr2", found, allowed, file=trial.file)
+
+
+def _follows(handle: np.ndarray) -> float:
+    """Return by how much a hand may depart from the path of the handle that it follows, but for a constant distance [m]."""
+    return max(_FOLLOWS[0], _FOLLOWS[1] * _rms(handle - handle.mean(axis=0)))
+
+
+def _dead_angles(model: Model, q: np.ndarray, handle: np.ndarray) -> list[int]:
+    """Return the joints, from 0, whose angles never change though the hand follows the handle with no constant angles of these joints.
+
+    A joint that is held contradicts no path, wherever the zero of its angle is.
+    """
+    still = [j for j, angle in enumerate(q.T) if constant(angle) is not None]
+    thin = slice(None, None, max(1, len(q) // 100))
+    angles = q.copy()
+
+    def departs(tried: np.ndarray) -> float:
+        gap = hand_path(model, tried) - handle[thin]
+        return _rms(gap - gap.mean(axis=0))
+
+    for j in still:
+        angles[:, j] += _best_zero(angles[thin], j, departs)[1]
+    return still if still and departs(angles[thin]) > _follows(handle) else []
+
+
+def _best_zero(q: np.ndarray, joint: int, apart: Callable[[np.ndarray], float]) -> tuple[float, float]:
+    """Return how far apart hand and handle are with the best zero of one joint, from 0, and what is added to its angle then [rad]."""
+    best, turned = 0.0, np.eye(q.shape[1])[joint]
+    for width in (np.pi, np.radians(2.0)):
+        tried = best + np.linspace(-width, width, 181)
+        sizes = [apart(q + offset * turned) for offset in tried]
+        best = float(tried[int(np.argmin(sizes))])
+    return min(sizes), best
 
 
 def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray, base: np.ndarray) -> tuple[float, Reading | None]:
@@ -107,22 +142,11 @@ def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarra
 
 def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, Reading | None]:
     """Return another zero of one joint's angle, and how far apart hand and handle are with it [m]; None where it is a small error."""
-    n = q.shape[1]
     thin = slice(None, None, max(1, len(q) // 100))
-    found = []
-    for j in range(n):
-        offset = np.zeros(n)
-        for width in (np.pi, np.radians(2.0)):
-            tried = offset[j] + np.linspace(-width, width, 181)
-            sizes = []
-            for value in tried:
-                offset[j] = value
-                sizes.append(_rms(hand_path(model, q[thin] + offset) - handle[thin]))
-            offset[j] = tried[int(np.argmin(sizes))]
-        found.append((min(sizes), j + 1, float(offset[j])))
-    nearest = min(found)[0]
-    best, joint, off = min((f for f in found if f[0] <= nearest + _PLAINER), key=lambda f: abs(f[2]))
-    return best, readings.other_zero(n, joint, off) if abs(off) >= OTHER_ZERO else None
+    found = [(_best_zero(q[thin], j, lambda tried: _rms(hand_path(model, tried) - handle[thin])), j + 1) for j in range(q.shape[1])]
+    nearest = min(found)[0][0]
+    (best, off), joint = min((f for f in found if f[0][0] <= nearest + _PLAINER), key=lambda f: abs(f[0][1]))
+    return best, readings.other_zero(q.shape[1], joint, off) if abs(off) >= OTHER_ZERO else None
 
 
 def hand_meets_handle(dataset: Dataset) -> bool:

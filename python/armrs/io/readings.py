@@ -11,6 +11,8 @@ import numpy as np
 _MOST_SWAPPED = 4
 """Joints up to which orders of columns are tried."""
 _DEGREE = float(np.radians(1.0))
+_SAME = 1e-3
+"""Angles that differ by no more are read alike [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,10 @@ class Reading:
     def angles(self, q: np.ndarray) -> np.ndarray:
         """Return the angles of the model, (n_samples, n_joints) [rad]."""
         return q @ self.turn.T + self.shift
+
+    def differs(self, q: np.ndarray) -> bool:
+        """Whether it reads these angles, (n_samples, n_joints) [rad], or forces otherwise; an angle that is always 0 has no side."""
+        return not np.array_equal(self.force, np.eye(2)) or bool(np.abs(self.angles(q) - q).max() > _SAME)
 
 
 def of_angles(n: int) -> Iterator[Reading]:
@@ -108,10 +114,13 @@ def of_forces(n: int) -> Iterator[Reading]:
         yield Reading(place, allowed, np.eye(n), np.zeros(n), np.array(force))
 
 
-def other_zero(n: int, joint: int, offset: float) -> Reading:
-    """Return the angles with that of a joint, from 1, turned by `offset` [rad]."""
+def other_zero(n: int, joint: int, offset: float, *, still: bool = False) -> Reading:
+    """Return the angles with that of a joint, from 1, turned by `offset` [rad]; `still` says that it never changes."""
     shift = np.zeros(n)
     shift[joint - 1] = offset
     size = f"{abs(offset):.2g} rad too {'large' if offset < 0.0 else 'small'}"
+    if still:
+        allowed = f"an angle that changes with the joint (a dead sensor? if the joint is held, q{joint} is {size})"
+        return Reading(f"column q{joint}", allowed, np.eye(n), shift)
     turned = ", or the axes of the force are turned by as much" if joint == 1 else ""
     return Reading(f"column q{joint}", f"angles with the model's zero (another zero: q{joint} is {size}{turned}?)", np.eye(n), shift)

@@ -31,20 +31,15 @@ def _spasticity(result: Mapping[str, Any]) -> str:
         if not effect["decided"]:
             said.append(f"{name}: no stretch reflex was detected in these stretches.")
             continue
-        from_on, gain, latency = (_between(p[key], factor, held_in) for key, factor, held_in in _SHOWN)
+        from_on, gain, latency = (tables.with_interval(p[key], _read_in) for key in ("threshold", "gain", "latency"))
         way = "growing" if p["direction"]["value"] > 0 else "falling"
         said.append(f"{name}: a reflex resists stretch with {way} angle above {from_on}; gain {gain}; latency {latency}.")
     return " ".join(said)
 
 
-_SHOWN = (("threshold", 180.0 / math.pi, "°/s"), ("gain", 1.0, "N m s/rad"), ("latency", 1000.0, "ms"))
-
-
-def _between(value: Mapping[str, Any], factor: float, held_in: str) -> str:
-    """Return a value in the unit that is `1 / factor` of its own, with its interval."""
-    std = factor * value["std"]
-    shown, low, high = (tables.number(factor * x, std) for x in (value["value"], *value["interval"]))
-    return f"{shown} {held_in} (95 % interval {low} to {high})"
+def _read_in(held_in: str) -> tuple[float, str]:
+    """Return the factor to the unit in which a clinic reads a value, and that unit: latencies in milliseconds."""
+    return (1000.0, "ms") if held_in == "s" else tables.read_in(held_in)
 
 
 def reflexes(result: Mapping[str, Any]) -> Table:
@@ -54,7 +49,7 @@ def reflexes(result: Mapping[str, Any]) -> Table:
         own = {k: v for k, v in effect["parameters"].items() if k != "direction"} if effect["decided"] else {}
         own |= {"viscosity besides reflex": besides["viscosity"], "dry friction besides reflex": besides["dry"]}
         for name, value in own.items():
-            factor, held_in = (1000.0, "ms") if value["unit"] == "s" else tables.read_in(value["unit"])
+            factor, held_in = _read_in(value["unit"])
             std = factor * value["std"]
             shown = [tables.number(factor * x, std) for x in (value["value"], *value["interval"])]
             rows.append([joints[effect["joint"] - 1], name, shown[0], tables.spread(std), f"{shown[1]} … {shown[2]}", held_in])

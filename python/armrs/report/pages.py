@@ -64,6 +64,7 @@ KINDS = {
     ),
 }
 """What a report can be made of, by the `verb` of a result."""
+RESULT = "the JSON of a result that a verb wrote (identified.json, passive.json, …, or the file given with --json)"
 
 
 def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -74,7 +75,7 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     BadInput
         When it is not JSON, or not a result that a report is made of.
     """
-    data = jsonfile.read(path)
+    data = jsonfile.read(path, RESULT)
     verb = data.get("verb") if isinstance(data, dict) else None
     if not isinstance(verb, str) or verb not in KINDS:
         found = Text("no key verb") if verb is None else verb

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -179,6 +179,21 @@ def number(value: float | None, std: float | None) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}" if digits <= _MOST_DECIMALS else f"{value:.3g}"
 
 
+def with_interval(value: Mapping[str, Any], reading: Callable[[str], tuple[float, str]] = read_in) -> str:
+    """Return a value with its unit, and the ends of its interval where it has one, to one digit of its standard deviation.
+
+    >>> with_interval({"value": 0.1613, "std": 0.006, "unit": "Nm", "interval": (0.1492, 0.1731)})
+    '0.161 N m (95 % interval 0.149 to 0.173)'
+    """
+    factor, held_in = reading(value["unit"])
+    coarse = value["std"] and 10.0 * factor * value["std"]
+    text = with_unit(number(factor * value["value"], coarse), held_in)
+    if coarse is None or not value.get("interval"):
+        return text
+    low, high = (number(factor * end, coarse) for end in value["interval"])
+    return f"{text} (95 % interval {low} to {high}{'°' if held_in == '°' else ''})"
+
+
 def spread(std: float | None) -> str:
     """Write a standard deviation with two digits."""
     if std is None:
@@ -296,11 +311,11 @@ def dependence(data: Mapping[str, Any]) -> Table:
     found = data["dependence"]
     by_name = [{c["name"]: c for c in d["coefficients"]} for d in found]
     rows: list[list[object]] = [
-        [name.replace("_", " ") + ("" if own["unit"] == "1" else f" [{unit(own['unit'])}]"), *(_with_interval(c[name]) for c in by_name)]
+        [name.replace("_", " ") + ("" if own["unit"] == "1" else f" [{unit(own['unit'])}]"), *(_in_brackets(c[name]) for c in by_name)]
         for name, own in by_name[0].items()
         if any(c[name]["value"] != 0.0 for c in by_name)
     ]
-    rows.append(["mean coupling [N m/rad]", *(_with_interval(d["mean_coupling"]) for d in found)])
+    rows.append(["mean coupling [N m/rad]", *(_in_brackets(d["mean_coupling"]) for d in found)])
     rows.append(
         ["mean coupling not zero, by this joint alone", *(f"{'yes' if d['coupled'] else 'no'} (p {_chance(d['p_value'])})" for d in found)]
     )
@@ -314,7 +329,7 @@ def _chance(p: float) -> str:
     return text if text.startswith("<") else f"= {text}"
 
 
-def _with_interval(found: Mapping[str, Any]) -> str:
+def _in_brackets(found: Mapping[str, Any]) -> str:
     low, high = found["interval"]
     return f"{found['value']:.3g} ({low:.3g} to {high:.3g})" if found["value"] != 0.0 or low != high else "0"
 

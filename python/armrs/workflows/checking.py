@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
+from ..analysis.passivity_checks import SLOW
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
 from ..io.dataset import NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
@@ -25,14 +26,13 @@ from ..tabular import Tabular, Tidy
 from . import setup
 from .gap import suspicion
 from .importing.clock import lateness
+from .passive import PassiveCurve, passive_moments
 
 _LATE, _LATE_BY = 0.06, 2.0
 """Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
 _LONG = 3.0
 """Length of a segment from which on its unit is asked for [m]."""
 _SAME_RATE = 0.02
-_SLOW = 0.3
-"""Joint speed up to which a movement counts as slow enough for passive moments [rad/s]."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +157,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     whole = dataset.replace(folder=path.parent, added=description.added)
     other = _other_arm(whole)
     problems += other
+    tell("passive moments", 0.8)
     return Checked(_feasible(dict.fromkeys(_not_implied(problems)), whole), _abilities(whole, blocked, bool(other)), whole)
 
 
@@ -199,7 +200,7 @@ def _remedy(error: ArmrsError) -> str:
         return "write decimal points, or import the recording again: armrs import reads decimal commas"
     if str(error.found).endswith(" twice"):
         return "rename or remove one of the two"
-    if "dead sensor" in (error.hint or ""):
+    if "dead sensor" in f"{error.hint} {error.allowed}":
         return "repair the sensor and record again, or leave the trial out of dataset.toml"
     if error.allowed == NUMBER and isinstance(error.found, str):
         return "leave the cell empty where the sample is missing"
@@ -259,20 +260,21 @@ _COLUMN = re.compile(r"\bcolumn (\w+)(?=:| jumps)")
 def _not_implied(problems: Iterable[Problem]) -> list[Problem]:
     """Return problems without what only follows from an error.
 
-    Of columns that hold something else, and of dead sensors, no weight can be told. What columns probably hold is told once, whether the
-    robot's handle or the balance of the arm shows it.
+    Of columns that hold something else, and of dead sensors, no weight can be told; and a dead sensor is no joint that is held. What
+    columns probably hold is told once, whether the robot's handle or the balance of the arm shows it.
     """
     told = list(problems)
     errors = [p.text for p in told if p.level == "error"]
     misread = any(words in text for text in errors for words in _MISREAD)
-    dead = any("dead sensor" in text for text in errors)
-    implied = _OF_VALUES if misread else _OF_FORCES if dead else ()
+    dead = [text.partition(": found ")[0] for text in errors if "dead sensor" in text]
+    angles = {name for place in dead for name in re.findall(r"\bq\d", place)}
+    implied = _OF_VALUES if misread or angles else _OF_FORCES if dead else ()
     by_handle = {text.partition(", allowed ")[2] for text in errors if _MISREAD[1] in text}
 
     def follows(p: Problem) -> bool:
         if p.level == "error":
             return _MISREAD[0] in p.text and p.text.partition(", allowed ")[2] in by_handle
-        return any(words in p.text for words in implied)
+        return any(words in p.text for words in implied) or p.text.partition(" is ")[0] in angles
 
     return [p for p in told if not follows(p)]
 
@@ -437,7 +439,7 @@ def _abilities(dataset: Dataset, blocked: bool, other_arm: bool) -> tuple[Abilit
     lacking = [] if repeats else ["repeats to estimate the noise from"]
     lacking += [] if dataset.test_trials else ['trials with role = "test" to measure the gap on']
     how = _how_gap(dataset)
-    passive = Ability("passive", bool(efforts), _how_passive(efforts))
+    passive = _passive(dataset)
     if other_arm:
         why = "correct the error above first"
         return Ability("identify", False, why), passive, Ability("gap", False, why)
@@ -452,12 +454,25 @@ def _abilities(dataset: Dataset, blocked: bool, other_arm: bool) -> tuple[Abilit
     )
 
 
-def _how_passive(efforts: Sequence[Trial]) -> str:
-    """Return which movements are slow enough for `passive`."""
-    slow = sorted({t.configuration for t in efforts if _speed(t) <= _SLOW})
-    if slow:
-        return f"slow movements: {', '.join(slow)}"
-    return f"no movement is slower than {_SLOW:g} rad/s: the moments contain viscosity" if efforts else "no forces and no torques"
+def _passive(dataset: Dataset) -> Ability:
+    """Return what `passive` finds: its curves, and which movements were slow."""
+    try:
+        found = passive_moments(dataset)
+    except BadInput as error:
+        return Ability("passive", False, str(error))
+    if not found.curves:
+        why = f"no joint moves long enough in both directions over the same angles for a low-pass at {found.cutoff:g} Hz"
+        return Ability("passive", False, why)
+    slow, fast = ([c for c in found.curves if (c.inertial_share <= SLOW) is one] for one in (True, False))
+    said = [f"slow movements of {_by_joint(slow)}"] if slow else []
+    said += [f"not slow, inertial torques exceed {100 * SLOW:.0f} % of the moment: {_by_joint(fast)}"] if fast else []
+    return Ability("passive", True, "; ".join(said))
+
+
+def _by_joint(curves: Sequence[PassiveCurve]) -> str:
+    """Return the joints of curves, each with its movements in brackets."""
+    joints = sorted({c.joint for c in curves})
+    return ", ".join(f"joint {j} ({', '.join(c.configuration for c in curves if c.joint == j)})" for j in joints)
 
 
 def _how_gap(dataset: Dataset) -> str:
@@ -470,9 +485,3 @@ def _how_gap(dataset: Dataset) -> str:
         "contact forces": any(t.force_on_arm is None for t in dataset.trials),
     }
     return f"by joint torques only, for lack of {', '.join(name for name, lacks in absent.items() if lacks)}"
-
-
-def _speed(trial: Trial) -> float:
-    """Return the joint speed that 95 % of the samples stay below [rad/s]."""
-    speeds = np.abs(np.gradient(trial.q, trial.t, axis=0))
-    return float(np.nanquantile(speeds, 0.95))

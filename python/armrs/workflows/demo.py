@@ -1,7 +1,7 @@
 """The main job on built-in data: an experiment on the thesis' mechanical arm, a search for what its model lacks, the gap before and after.
 
 Everything is simulated, and the model handed over lacks the brakes of both joints. The search over the whole catalogue is told nothing of
-them; what it finds is added, and what that is worth is measured on trials that were kept apart.
+them; what it finds is added, and what that is worth is measured on test trials.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ TWO_SPEEDS = {
 }
 """Dry friction and viscosity resist alike at one speed: the search needs two."""
 REPEATS = 4
-"""Of each of these movements; the last is kept apart."""
+"""Of each of these movements; the last is the test trial."""
 SLOWEST = 0.2
 """Movements below are slow [rad/s]."""
 TOO_HEAVY = 1.1

@@ -157,7 +157,7 @@ def _correlations(result: dict[str, Any], names: list[str]) -> np.ndarray:
 
 
 def _result(path: Path) -> dict[str, Any]:
-    result = jsonfile.read(path)
+    result = jsonfile.read(path, "the JSON of armrs identify")
     if isinstance(result, dict) and {"combinations", "parameters"} <= result.keys():
         return result
     raise BadInput("--identified", Text("no result"), "the JSON of armrs identify", file=path)

@@ -8,7 +8,7 @@ from itertools import islice
 
 import numpy as np
 
-from ..analysis.balance import SAMPLES, Motion, motion_of, unexplained, weight_of
+from ..analysis.balance import BALANCED, SAMPLES, Motion, motion_of, unexplained, weight_of
 from ..errors import BadInput, Text
 from ..io import readings
 from ..io.dataset import Dataset
@@ -28,9 +28,9 @@ _BETTER_ALONE = 4.0
 """The same for a single trial."""
 _SAMPLES_ALONE = 200
 """Samples of a single trial that are regressed."""
-_BALANCED, _AT_ALL = 0.1, 0.5
-"""Another reading balances the arm that leaves at most this share; the right one leaves 0.07 in 99 of 100 of these sessions.
-Where the given one leaves ten times as much, as forces in another unit do, the second share is enough."""
+_AT_ALL = 0.5
+"""Another reading balances the arm that leaves at most `BALANCED`, or this where the given one leaves ten times as much, as forces in
+another unit do."""
 _UNEXPLAINED_BY_ZERO, _BETTER_BY_ZERO = 0.05, 2.5
 """The same for another zero, whose number is fitted: in the right setup at most 2.0 times less."""
 _PLAINER = 1.5
@@ -135,7 +135,7 @@ def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool
         if zero is not None and _PLAINER * zero[0] < ranked[0][0]:
             ranked, least = [zero], _BETTER_BY_ZERO
     left, best = ranked[0]
-    if left > max(_BALANCED, min(_AT_ALL, 0.1 * given)) or least * left > given:
+    if left > max(BALANCED, min(_AT_ALL, 0.1 * given)) or least * left > given:
         return None
     also = ""
     if len(ranked) > 1 and ranked[1][0] < max(min(_TIED * left, _MUCH * given), _PLAINER * left):
@@ -209,7 +209,7 @@ def _ranked(model: Model, motion: Motion, met: bool) -> list[tuple[float, Readin
     """Return what every other reading leaves, the least first; of the forces alone where the angles are known to be right."""
     n = model.n_joints
     asked = [*readings.of_forces(n)] if met else [*readings.of_angles(n), *readings.of_forces(n)]
-    return sorted(((unexplained(model, motion.read_as(r)), r) for r in asked), key=lambda item: item[0])
+    return sorted(((unexplained(model, motion.read_as(r)), r) for r in asked if r.differs(motion.q)), key=lambda item: item[0])
 
 
 def _motion(trials: Sequence[Trial], samples: int = SAMPLES) -> Motion | None:
@@ -236,4 +236,4 @@ def _other_zero(model: Model, motion: Motion) -> tuple[float, Reading] | None:
     least, joint, offset = min(found)
     if abs(offset) < OTHER_ZERO or (joint == 1 and abs(abs(offset) - np.pi / 2) < OTHER_ZERO):
         return None
-    return least, readings.other_zero(n, joint, offset)
+    return least, readings.other_zero(n, joint, offset, still=constant(motion.q[:, joint - 1]) is not None)

@@ -65,7 +65,7 @@ def _too_steep(model: Model, dt: float = DEFAULT_DT) -> Iterator[tuple[Effect, s
     agility = np.diag(np.linalg.inv(_armrs.Arm.from_model(model).inertia(np.zeros(model.n_joints))))
     for law in model.all_effects:
         size = catalogue()[law.kind].parameters[0]
-        # Not where the size is a share of the force through the joint: so steep, such friction has mostly no single answer if set-valued.
+        # Not where the size is a share of the force through the joint: so steep, such friction mostly has no unique solution if set-valued.
         if law.joint is None or size.unit != "N m":
             continue
         for smoothing in _smoothings(law):

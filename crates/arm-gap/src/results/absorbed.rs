@@ -46,13 +46,13 @@ pub(super) fn stopped<'c, const N: usize>(
         .filter(|a| a.value.abs() > a.promised)
         .map(|a| {
             let (value, promised) = (in_unit(a.value, &a.unit), in_unit(a.promised, &a.unit));
-            format!("{} by {value} where {promised} was promised", a.name)
+            format!("{} by {value} (prior ± {promised}, 2 σ)", a.name)
         })
         .collect();
     (!words.is_empty()).then(|| {
         format!(
-            "refitted as far as is allowed: {}. What this could not take up may stand in a name: look at what the model and [tolerance] say \
-             of it",
+            "the calibration stopped at its limit: {}. An error beyond the limit may appear as a named effect: check these values in the \
+             model and in [tolerance]",
             words.join("; ")
         )
     })
@@ -185,7 +185,7 @@ mod tests {
         bounded[1].prior = Some((0.0, 0.001));
         let told = stopped(&model, &hypothesis, bounded.iter()).expect("a warning");
         assert!(
-            told.contains("place of the robot, z by 3.0e-3 m where 2.0e-3 m was promised."),
+            told.contains("place of the robot, z by 3.0e-3 m (prior ± 2.0e-3 m, 2 σ)."),
             "{told}"
         );
         assert!(!told.contains("mass"), "{told}");

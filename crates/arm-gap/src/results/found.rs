@@ -185,8 +185,8 @@ fn held_in_motion<const N: usize>(session: &Session<N>) -> Vec<String> {
     let line = |joint: usize| {
         let j = joint + 1;
         format!(
-            "joint {j} is held by friction nearly all the time: as a viscosity it would be more than {FURTHEST} times what is expected. The \
-             simulation holds the joint where it starts; its laws cannot be told, and amended.toml has none for it"
+            "friction holds joint {j} nearly all the time: expressed as a viscosity, it is more than {FURTHEST} times the expected one. The \
+             simulation fixes the joint at its initial angle; its laws cannot be identified, and amended.toml has none for it"
         )
     };
     session.held_in_motion().into_iter().map(line).collect()

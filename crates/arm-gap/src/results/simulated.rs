@@ -41,7 +41,7 @@ pub struct SimulatedTrial {
     pub file: String,
     /// The movement; repeats share it.
     pub group: usize,
-    /// Whether it was kept apart.
+    /// Whether it is a test trial.
     pub test: bool,
     /// Sampling rate \[Hz\].
     pub rate: f64,

@@ -1,11 +1,11 @@
-//! The verdict's test on the trials that were kept apart: does what a model leaves of each channel exceed what repeats differ by?
+//! The verdict's test on the test trials: does what a model leaves of each channel exceed what repeats differ by?
 
 /// What a model leaves of one trial.
 #[derive(Clone, Debug)]
 pub struct Left {
     /// The movement; repeats share it.
     pub group: usize,
-    /// Whether it was kept apart.
+    /// Whether it is a test trial.
     pub test: bool,
     /// Sampling rate \[Hz\].
     pub rate: f64,

@@ -9,7 +9,7 @@ pub use arm_model::Tolerance;
 pub enum Role {
     /// Used for fitting.
     Fit,
-    /// Kept apart: only residuals are computed on it.
+    /// A test trial: only residuals are computed on it.
     Test,
 }
 

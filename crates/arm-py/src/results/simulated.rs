@@ -21,7 +21,7 @@ use crate::errors::bad_input;
 /// group : int
 ///     The movement; repeats share it.
 /// test : bool
-///     Whether it was kept apart.
+///     Whether it is a test trial.
 /// rate : float
 ///     Sampling rate [Hz].
 /// counted : ndarray of bool, shape (n,)
@@ -108,7 +108,7 @@ impl SimulatedTrial {
     fn group(&self) -> usize {
         self.0.group
     }
-    /// Whether it was kept apart.
+    /// Whether it is a test trial.
     #[getter]
     fn test(&self) -> bool {
         self.0.test

@@ -30,7 +30,7 @@ pub(crate) struct Solved<const N: usize> {
     pub dry: Friction<f64, N>,
     /// The joints that stick.
     pub held: [bool; N],
-    /// Joint in which the friction has no single answer, and what it adds to itself.
+    /// Joint in which the friction has no unique solution, and its loop gain.
     pub jam: Option<(usize, f64)>,
 }
 
@@ -63,7 +63,7 @@ const LED_STEADY: f64 = 1e-6;
 const STIFF: f64 = 1e-9;
 /// Passes of Newton's method for friction that grows with the joint force.
 const PASSES: usize = 30;
-/// Determinant of one less the gain of that friction below which it has no single answer.
+/// Determinant of one less the gain of that friction below which it has no unique solution.
 const SINGLE: f64 = 0.02;
 /// Changes of one mode each in which the modes of all joints are found.
 const CHANGES: usize = 64;

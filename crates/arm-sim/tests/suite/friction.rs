@@ -106,7 +106,7 @@ fn a_sticking_wrist_starts_and_stays_where_it_is() {
     assert!(apart < 1e-7, "{apart:e} rad");
 }
 
-/// Friction that makes the force with which it grows has no single answer, and is refused with the number.
+/// Friction that increases the force on which it depends may have no unique solution, and is refused with its loop gain.
 #[test]
 fn friction_that_jams_is_refused() {
     let mut experiment = models::mechanical_experiment(1.0, [0.0; 2]).expect("a sample");
@@ -117,7 +117,7 @@ fn friction_that_jams_is_refused() {
     match simulate(&experiment) {
         Err(error @ SimulationError::Jam { .. }) => {
             let said = error.to_string();
-            assert!(said.contains("no single answer"), "{said}");
+            assert!(said.contains("no unique solution"), "{said}");
         }
         Err(other) => panic!("{other}"),
         Ok(r) => assert!(most(r.energy_error()) < 1e-6),

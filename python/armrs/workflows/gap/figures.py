@@ -15,7 +15,7 @@ from ...report.tables import read_in
 from . import maps
 from .core_input import channel_names, is_led
 from .found import GapFound
-from .headline import channel_label, place_of
+from .headline import channel_label, place_of, rank
 from .shapes import Portrait, portrait, telling_trial
 from .summary import summary
 
@@ -43,7 +43,7 @@ def gap(result: GapFound) -> Figures:
         figures["maps"] = partial(missing_torque, [j.name for j in result.dataset.model.joints], missing)
     if result.search_trace:
         figures["search_trace"] = partial(_search_trace, result)
-    by_joint = sorted(enumerate(result.effects), key=lambda numbered: numbered[1].joint or np.inf)
+    by_joint = sorted(enumerate(result.effects), key=lambda numbered: rank(numbered[1].joint))
     return figures | {_name_of(k, e): partial(_effect, result, k, e) for k, e in by_joint}
 
 

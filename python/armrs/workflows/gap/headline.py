@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...catalogue import catalogue, title
-from ...report.tables import digits, number, read_in, with_unit
+from ...report.tables import digits, read_in, with_interval, with_unit
 
 OPEN = 1.5
 """A channel is open as a whole where its gap exceeds so many times its floor."""
@@ -55,9 +55,14 @@ def effect_name(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
     return place_of(effect["kind"], effect["joint"], effect["channel"], joints)
 
 
+def rank(joint: int | None) -> float:
+    """Return by what effects are sorted: joint by joint, as on the page for a clinician; behind them those of no joint."""
+    return joint or math.inf
+
+
 def by_joint(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the named effects joint by joint, as the page for a clinician has them; behind them those of no joint."""
-    return sorted(result["effects"], key=lambda effect: effect["joint"] or math.inf)
+    """Return the named effects in the order of `rank`."""
+    return sorted(result["effects"], key=lambda effect: rank(effect["joint"]))
 
 
 def joined(names: Sequence[str], last: str = "and") -> str:
@@ -104,7 +109,7 @@ def only_near(result: Mapping[str, Any]) -> bool:
 
 
 def headline(result: Mapping[str, Any]) -> str:
-    """Return the answer in one sentence: what the model lacks, and what that does to the gap on trials that were kept apart."""
+    """Return the answer in one sentence: what the model lacks, and what that does to the gap on the test trials."""
     joints, effects = result["data"]["joints"], by_joint(result)
     opened, unexplained = still_open(result), result["verdict"] == "unexplained"
     tested = result["lack_of_fit"]["amended"]["z"] is not None
@@ -204,18 +209,7 @@ def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
     parameter = largest(effect["parameters"])
     if not _decided(effect) or parameter is None:
         return name
-    return f"{name}, {with_interval(parameter, effect['parameters'][parameter])}"
-
-
-def with_interval(parameter: str, value: Mapping[str, Any]) -> str:
-    """Return a value with its name and unit, and the ends of its interval where it has one, to one digit of its standard deviation."""
-    factor, held_in = read_in(value["unit"])
-    coarse = value["std"] and 10.0 * factor * value["std"]
-    text = f"{parameter} {with_unit(number(factor * value['value'], coarse), held_in)}"
-    if coarse is None or not value.get("interval"):
-        return text
-    low, high = (number(factor * end, coarse) for end in value["interval"])
-    return f"{text} (95 % interval {low} to {high}{'°' if held_in == '°' else ''})"
+    return f"{name}, {parameter} {with_interval(effect['parameters'][parameter])}"
 
 
 def largest(parameters: Mapping[str, Mapping[str, Any]]) -> str | None:

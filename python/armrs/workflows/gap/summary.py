@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..._armrs import ChannelGap, Missing
 from ...catalogue import Kind, catalogue, title
 from ...report import plotting
@@ -14,7 +12,7 @@ from ...report.figures import Drawn
 from ...report.sketch import sketch
 from ...report.tables import number, read_in, spread, with_unit
 from .found import GapFound
-from .headline import largest, left, only_near, place_of, shown_in, still_open
+from .headline import largest, left, only_near, place_of, rank, shown_in, still_open
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,7 +66,7 @@ def drawn_arm(result: GapFound, ax: Axes) -> None:
     joints = [j.name for j in dataset.model.joints]
     marked = {place for effect in result.effects for place in marks(effect, catalogue()[effect.kind])}
     lines = []
-    for effect in sorted(result.effects, key=lambda e: e.joint or np.inf):
+    for effect in sorted(result.effects, key=lambda e: rank(e.joint)):
         named = f"{joints[effect.joint - 1]}: " if effect.joint else f"{effect.channel}: " if effect.channel else ""
         here = f"{effect.joint}  {named}" if effect.joint else f"{_SIGNS.get(catalogue()[effect.kind].where, '■')}  {named}"
         lines.append((here + _words(effect), plotting.INK if getattr(effect, "decided", True) is not False else plotting.RED))

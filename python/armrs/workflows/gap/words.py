@@ -10,7 +10,7 @@ from typing import Any
 from ..._armrs import MISFIT
 from ...report import tables
 from ...report import words as common
-from ...report.tables import Table, digits, number, smallest_effects, spread
+from ...report.tables import Table, digits, number, smallest_effects, spread, with_interval
 from . import headline
 from .headline import effect_name, joined
 
@@ -25,7 +25,7 @@ _BETTER = 10.0
 def size(effect: Mapping[str, Any]) -> str:
     """Return the size of an effect with its interval."""
     name = headline.largest(effect["parameters"]) or next(iter(effect["parameters"]))
-    return headline.with_interval(name, effect["parameters"][name])
+    return f"{name} {with_interval(effect['parameters'][name])}"
 
 
 def chance(effect: Mapping[str, Any]) -> str:
@@ -102,7 +102,7 @@ def others(result: Mapping[str, Any]) -> list[str]:
 def tie(result: Mapping[str, Any]) -> str:
     """Return by how much alternatives may explain the data less and still not be told apart."""
     worse = any((a.get("worse") or 0.0) > _BETTER for effect in result["effects"] for a in effect["alternatives"])
-    beyond = ", or by no more than an inexact law may miss" if worse else ""
+    beyond = ", or by no more than the possible error of the named law" if worse else ""
     return (
         f"These explain the data as well, or less by up to {_BETTER:.0f} units of twice the log-likelihood{beyond}: on these movements "
         "they cannot be told apart."
@@ -116,7 +116,7 @@ def _separating(alternative: Mapping[str, Any]) -> str:
         return ""
     now, then = (digits(separation[key], 2) for key in ("now", "then"))
     if (alternative.get("worse") or 0.0) > _BETTER:
-        now += ", which the error of an inexact law may cause"
+        now += ", which the error of the named law may cause"
     best = alternative["separating_movement"]
     if separation["then"] < _TELLS:
         best = f"no movement that was tried separates them clearly. The best: {best}"

@@ -79,8 +79,8 @@ def settled(
     if apart and not problems:
         if len(apart) > 1:
             reads = _matched(reads, apart, channels, model, given)
-        reads, lines, doubts = _refined(reads, channels, _decided(reads, channels, model, given, []), model)
-    return list(reads), _decided(reads, channels, model, given, problems), lines, doubts
+        reads, lines, doubts = _refined(reads, channels, _decided(reads, channels, model, given, [], []), model)
+    return list(reads), _decided(reads, channels, model, given, problems, doubts), lines, doubts
 
 
 def _matched(
@@ -112,25 +112,38 @@ def _refined(
     recordings = [_recording(reads[k], channels, convention) for k in apart]
     found = dict(zip(apart, clock.certain(model, recordings, clock.refine(model, recordings)), strict=True))
     new = [r if k not in found else changed(r, trial=changed(r.trial, force_shift=found[k].seconds)) for k, r in enumerate(reads)]
-    lines, doubts = [], []
+    shifts, doubts = dict[str, list[str]](), dict[str, list[str]]()
     for k, shift in found.items():
-        file = reads[k].trial.force_file
-        exactly = f" ± {shift.std:.3f} s" if np.isfinite(shift.std) else "; a delay and the friction of the joints look alike in it"
-        lines.append(f"{file}: forces shifted by {shift.seconds:+.3f} s{exactly}")
+        file = str(reads[k].trial.force_file)
+        exactly = f" ± {shift.std:.3f} s" if np.isfinite(shift.std) else " (a delay and the friction of the joints look alike in it)"
+        shifts.setdefault(f"{shift.seconds:+.3f} s{exactly}", []).append(file)
         if shift.others:
             rivals = " or ".join(f"{s:+.3f} s" for s in shift.others)
             why = "explain them about as well, as where a movement repeats itself; if one of these is right, write it into import.toml"
-            doubts.append(f"{file}: forces shifted by {shift.seconds:+.3f} s, but {rivals} {why} (force_shift) and import that")
-    if 2 * len(doubts) >= len(found) > len(doubts) and len({shift.seconds for shift in found.values()}) > 1:
-        doubts.append("the clocks of the other recordings were found together with these, and are in doubt as well")
-    return new, lines, doubts
+            said = f"forces shifted by {shift.seconds:+.3f} s, but {rivals} {why} (force_shift) and import that"
+            doubts.setdefault(said, []).append(file)
+    doubted = [f"{_of(files)}: {said}" for said, files in doubts.items()]
+    count = sum(map(len, doubts.values()))
+    if 2 * count >= len(found) > count and len({shift.seconds for shift in found.values()}) > 1:
+        doubted.append("the clocks of the other recordings were found together with these, and are in doubt as well")
+    return new, [f"forces shifted by {', '.join(f'{by} ({_of(files)})' for by, files in shifts.items())}"] if shifts else [], doubted
+
+
+def _of(files: Sequence[str]) -> str:
+    """Return the first of files, and how many more there are."""
+    return f"{files[0]} and {len(files) - 1} more" if len(files) > 1 else files[0]
 
 
 def _decided(
-    reads: Sequence[Read], channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
+    reads: Sequence[Read],
+    channels: Sequence[Channel],
+    model: Model,
+    given: Mapping[str, object],
+    problems: list[BadInput],
+    doubts: list[str],
 ) -> Convention:
     """Return the convention in which the arm balances."""
-    return conventions.decide(model, _recorded(reads, channels, model), given, problems)
+    return conventions.decide(model, _recorded(reads, channels, model), given, problems, doubts)
 
 
 def _recorded(reads: Sequence[Read], channels: Sequence[Channel], model: Model) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:

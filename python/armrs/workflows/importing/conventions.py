@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis.balance import Motion, motion_of, unexplained
+from ...analysis.balance import BALANCED, Motion, motion_of, unexplained
 from ...errors import BadInput, Text
 from ...io.readings import Reading
 from ...model import Model
@@ -94,6 +94,7 @@ def decide(
     recordings: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
     given: Mapping[str, object],
     problems: list[BadInput],
+    doubts: list[str],
 ) -> Convention:
     """Return the convention in which the arm balances.
 
@@ -107,6 +108,8 @@ def decide(
         What the caller states; see `candidates`.
     problems : list of BadInput
         Gets a refusal where several conventions balance the arm equally well, or none does.
+    doubts : list of str
+        Gets a line where the arm balances only roughly.
     """
     motion = motion_of([(t, q, force, None) for t, q, force in recordings])
     found = [balance(model, motion, c) for c in candidates(model.n_joints, given, has_force=True)]
@@ -124,6 +127,12 @@ def decide(
     elif rivals and best is not usual and rivals[0].unexplained < _CLEAR * best.unexplained:
         both = Text(f"two conventions that explain the forces equally well: {best.convention.words()}; or {rivals[0].convention.words()}")
         problems.append(BadInput("angles and forces", both, "one; state it with --angles, --zero, --clockwise or --force-on"))
+    elif best.unexplained > BALANCED:
+        doubts.append(
+            f"gravity, inertia and passive joints leave {100 * best.unexplained:.3g} % of the contact torques unexplained, more than "
+            f"{100 * BALANCED:.0f} %: a zero of an angle, an axis or a zero of the force, or a clock is wrong, or the convention is "
+            "another one; compare recording.png with the laboratory"
+        )
     c = best.convention
     next_best = f", the next best {100 * rivals[0].unexplained:.0f} %" if rivals else ""
     why = f"the balance leaves {100 * best.unexplained:.0f} % of the contact torques unexplained{next_best}"

@@ -20,7 +20,7 @@ _OTHER_WORDS = 1
 """Words that the names of a file of angles and its file of forces may each have for themselves, such as those of the devices."""
 _SEPARATORS = re.compile(r"[\s_\-.]+")
 _FEWEST = 3
-"""Repeats from which on the last one is kept apart: two are left to read the noise off."""
+"""Repeats from which on the last one becomes the test trial: two are left to read the noise off."""
 
 
 @dataclass(frozen=True)
