@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -355,20 +354,6 @@ def test_forces_that_balance_the_arm_roughly_are_in_doubt(recording: Recording, 
         assert cli.main(arguments) == status
         doubted = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  in doubt: ")]
         assert len(doubted) == status and all("% of the contact torques unexplained, more than 10 %" in line for line in doubted)
-
-
-def test_one_clock_of_all_forces_is_one_line(recording: Recording, tmp_path: Path) -> None:
-    """It was told once for each file."""
-    (tmp_path / "raw").mkdir()
-    for k in (1, 2, 3):
-        _, values = table(recording, names=SI)
-        q_and_f = repeated(values, k)
-        write_text(tmp_path / "raw" / f"slow_{k}.csv", ["time [s]", "shoulder [rad]", "elbow [rad]"], q_and_f[:, :3])
-        forces = np.column_stack([recording.t + 1.3, q_and_f[:, 3:]])
-        write_text(tmp_path / "raw" / f"slow_{k}_force.csv", ["time [s]", "Fy [N]", "Fz [N]"], forces)
-    done = armrs.import_recordings([tmp_path / "raw"], tmp_path / "session", model=KNOWN)
-    [line] = [note for note in done.notes if "forces shifted by" in note]
-    assert re.match(r"forces shifted by -1\.30\d s ± \S+ s \(.*slow_1_force\.csv and 2 more\)$", line), line
 
 
 def test_import_toml_repeats_an_import(recording: Recording, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import select
 import subprocess
 import sys
@@ -166,3 +167,17 @@ def test_columns_without_names_are_asked_for_with_a_guess(recording: Recording, 
     assert "found 'f', allowed a name or number of the list" in said
     (trial,) = armrs.load_dataset(tmp_path / "set").trials
     assert np.abs(trial.q - recording.q).max() < 1e-9 and trial.force_on_arm is not None
+
+
+def test_one_clock_of_all_forces_is_one_line(recording: Recording, tmp_path: Path) -> None:
+    """It was told once for each file."""
+    (tmp_path / "raw").mkdir()
+    for k in (1, 2, 3):
+        _, values = table(recording, names=SI)
+        q_and_f = repeated(values, k)
+        write_text(tmp_path / "raw" / f"slow_{k}.csv", ["time [s]", "shoulder [rad]", "elbow [rad]"], q_and_f[:, :3])
+        forces = np.column_stack([recording.t + 1.3, q_and_f[:, 3:]])
+        write_text(tmp_path / "raw" / f"slow_{k}_force.csv", ["time [s]", "Fy [N]", "Fz [N]"], forces)
+    done = armrs.import_recordings([tmp_path / "raw"], tmp_path / "session", model=KNOWN)
+    [line] = [note for note in done.notes if "forces shifted by" in note]
+    assert re.match(r"forces shifted by -1\.30\d s ± \S+ s \(.*slow_1_force\.csv and 2 more\)$", line), line
