@@ -103,6 +103,8 @@ WIDER = "[...document.querySelectorAll('.wide')].filter(e => e.scrollWidth > e.c
 """Tables that must be scrolled."""
 WIDTHS = (1400, 390)
 """Of a window and of a phone [px]."""
+SHEET = 794
+"""Width of a window that shows a page as wide as A4 [px]."""
 A4 = {"width": 718, "height": 1047}
 """Within margins of 1 cm, in CSS pixels."""
 
@@ -136,14 +138,14 @@ def violations(page: Any, rules: Sequence[str] = ()) -> list[str]:
 
 
 def faults_on_screens(path: Path) -> list[str]:
-    """Return what is wider than a window of 1400 px and of 390 px, and what axe-core finds at each, in light and dark."""
+    """Return what is wider than a window of 1400 px, of A4 and of 390 px, and what axe-core finds at each, in light and dark."""
     with opened(path, width=1400) as seen:
         return [*too_wide(seen.page), *inaccessible(seen.page)]
 
 
 def too_wide(page: Any) -> Iterator[str]:
     """Give what is wider than the window."""
-    for width in WIDTHS:
+    for width in (*WIDTHS, SHEET):
         page.set_viewport_size({"width": width, "height": 800})
         if page.evaluate("document.documentElement.scrollWidth") > width:
             yield f"wider than {width} px"

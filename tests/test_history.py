@@ -42,7 +42,7 @@ def test_a_change_is_found_and_the_rest_is_not(identified: Identified, tmp_path:
         courses = sessions.add(file, moved(identified, {"m2*l2": 0.2 * k * std}), date).courses
         assert not any(c.changed for c in courses)
     courses = sessions.add(file, moved(identified, {"m2*l2": 8.0 * std}), "2026-04-02").courses
-    assert [c.label for c in courses if c.changed] == ["m2*l2"]
+    assert [c.label for c in courses if c.changed] == ["m2·l2"]
     course = next(c for c in courses if c.name == "m2*l2")
     assert course.dates == ("2026-01-05", "2026-02-03", "2026-03-04", "2026-04-02")
     # Three equal deviations: their mean is surer by the root of three.

@@ -89,7 +89,7 @@ def test_the_verb_writes_a_page_and_keeps_a_history(tmp_path: Path, capsys: pyte
         out = ["-o", str(tmp_path / f"o{number}"), "--json", str(tmp_path / f"{number}.json")]
         assert main(["spasticity", str(folder), *history, *out]) == 0
     said = capsys.readouterr().out
-    assert "a reflex resists stretch" in said and "since the session before" in said
+    assert "a stretch reflex resists where the angle grows faster than" in said and "since the session before" in said
     courses = json.loads((tmp_path / "1.json").read_text())["history"]
     changed = {c["name"] for c in courses if c["changed_since_last"]}
     assert "gain" in changed and "latency" not in changed

@@ -78,10 +78,40 @@ def test_sentences_write_a_value_and_its_interval_in_one_way() -> None:
     parameters = {"direction": way, "threshold": threshold, "gain": value(0.5012, 0.02, "N m s/rad"), "latency": latency}
     reflex = {"joint": 1, "decided": True, "parameters": parameters}
     assert clinic_words.verdict({"verb": "spasticity", "data": {"joints": ["elbow"]}, "effects": [reflex]}) == (
-        "elbow: a reflex resists stretch with growing angle above 92 °/s (95 % interval 88 to 95); gain 0.50 N m s/rad "
+        "elbow: a stretch reflex resists where the angle grows faster than 92 °/s (95 % interval 88 to 95); gain 0.50 N m s/rad "
         "(95 % interval 0.46 to 0.54); latency 40 ms (95 % interval 36 to 44)."
     )
     assert words.size({"parameters": {"speed": threshold}}) == "speed 92 °/s (95 % interval 88 to 95)"
+
+
+def test_what_is_followed_has_the_names_and_units_of_the_page_it_stands_on() -> None:
+    """Below a table in degrees and milliseconds stood `stretch_reflex 1 threshold` in rad/s and a latency in seconds."""
+    since = dict.fromkeys(("since_last", "since_last_std", "change", "change_std"), 0.002)
+    tested = {"since_last_p_value": 0.4, "p_value": 1e-14, "changed_since_last": False, "changed": True}
+    reflex = {"kind": "stretch_reflex", "joint": 1, "dates": ["a", "b", "c"], "stds": [0.002] * 3, **since, **tested}
+    threshold = {"name": "threshold", "unit": "rad/s", "values": [1.0, 1.0, 1.002], **reflex}
+    table = tables.history([threshold, {**threshold, "name": "latency", "unit": "s", "values": [0.04, 0.04, 0.0393]}])
+    assert table.rows == [
+        ["stretch reflex threshold, joint 1", "°/s", 3, "57.41 ± 0.11", "+0.11 ± 0.11", "no (p = 0.4)", "+0.11 ± 0.11", "yes (p < 1e-12)"],
+        ["stretch reflex latency, joint 1", "ms", 3, "39.3 ± 2.0", "+2.0 ± 2.0", "no (p = 0.4)", "+2.0 ± 2.0", "yes (p < 1e-12)"],
+    ]
+    half_width = {**threshold, "kind": "passive", "name": "half_width in slow_elbow", "unit": "N m"}
+    assert tables.course_label(half_width) == "passive half width, joint 1 in slow_elbow"
+    assert len(tables.history([{**threshold, "dates": ["a"], "change": None, "p_value": None}]).head) == 4
+
+
+def test_a_difference_between_groups_has_a_direction() -> None:
+    """The page of a cohort said that they differ, once for the groups and once for the sides."""
+
+    def contrast(first: str, second: str, difference: float, p_value: float) -> dict[str, Any]:
+        return {"name": "half_width in slow", "between": [first, second], "difference": difference, "p_value": p_value}
+
+    found = {"verb": "cohort", "subjects": 12, "sessions": 24, "quantities": [{"name": "half_width in slow"}]}
+    found["contrasts"] = [contrast("control", "patient", 0.6, 1e-4), contrast("left", "right", -0.2, 0.01), contrast("a", "b", 1.0, 0.2)]
+    assert clinic_words.verdict(found) == (
+        "12 subjects, 24 sessions, 1 quantity. Half width in slow is higher in patient than in control and lower in right than in left "
+        "(level of 5 % for all comparisons together)."
+    )
 
 
 def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:

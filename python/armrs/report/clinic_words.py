@@ -13,9 +13,14 @@ from . import tables, words
 from .tables import Table
 
 LAW = (
-    "A reflex resists the stretch as gain times the speed beyond its threshold, after its latency. Short of the tonic angle, where one is "
-    "stated, the threshold is higher by the slope for each radian. Springs, viscosity, friction and what is wrong with the inertia of the "
-    "model are fitted beside it, with an offset in every trial."
+    "The reflex torque is the gain times the speed beyond the threshold, delayed by the latency. Where a tonic angle is stated, the "
+    "threshold rises by the slope for every radian short of it. A spring, viscosity, dry friction and an error of the model's inertia are "
+    "fitted together with the reflex, and an offset in every trial."
+)
+STRETCHES = (
+    "Means over the repeats of each movement, the slowest first. Speed: the largest of the stretch. Peak: largest moment less that at the "
+    "beginning. Work: done on the joint. Elastic, viscous and dry, reflex: the largest of each part of the fitted law. Catch: where the "
+    "reflex reaches a tenth of its largest moment."
 )
 
 
@@ -31,15 +36,10 @@ def _spasticity(result: Mapping[str, Any]) -> str:
         if not effect["decided"]:
             said.append(f"{name}: no stretch reflex was detected in these stretches.")
             continue
-        from_on, gain, latency = (tables.with_interval(p[key], _read_in) for key in ("threshold", "gain", "latency"))
-        way = "growing" if p["direction"]["value"] > 0 else "falling"
-        said.append(f"{name}: a reflex resists stretch with {way} angle above {from_on}; gain {gain}; latency {latency}.")
+        from_on, gain, latency = (tables.with_interval(p[key], tables.read_followed) for key in ("threshold", "gain", "latency"))
+        way = "grows" if p["direction"]["value"] > 0 else "falls"
+        said.append(f"{name}: a stretch reflex resists where the angle {way} faster than {from_on}; gain {gain}; latency {latency}.")
     return " ".join(said)
-
-
-def _read_in(held_in: str) -> tuple[float, str]:
-    """Return the factor to the unit in which a clinic reads a value, and that unit: latencies in milliseconds."""
-    return (1000.0, "ms") if held_in == "s" else tables.read_in(held_in)
 
 
 def reflexes(result: Mapping[str, Any]) -> Table:
@@ -49,7 +49,7 @@ def reflexes(result: Mapping[str, Any]) -> Table:
         own = {k: v for k, v in effect["parameters"].items() if k != "direction"} if effect["decided"] else {}
         own |= {"viscosity besides reflex": besides["viscosity"], "dry friction besides reflex": besides["dry"]}
         for name, value in own.items():
-            factor, held_in = _read_in(value["unit"])
+            factor, held_in = tables.read_followed(value["unit"])
             std = factor * value["std"]
             shown = [tables.number(factor * x, std) for x in (value["value"], *value["interval"])]
             rows.append([joints[effect["joint"] - 1], name, shown[0], tables.spread(std), f"{shown[1]} … {shown[2]}", held_in])
@@ -87,11 +87,20 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 def _cohort(result: Mapping[str, Any]) -> str:
     differ = [c for c in result["contrasts"] if c["p_value"] is not None and c["p_value"] < 0.05]
-    named = "; ".join(f"{c['name']} differs between {c['between'][0]} and {c['between'][1]}" for c in differ)
+    higher: dict[str, list[str]] = {}
+    for c in differ:
+        first, second = c["between"]
+        higher.setdefault(_named(c), []).append(f"{'higher' if c['difference'] > 0.0 else 'lower'} in {second} than in {first}")
+    named = "; ".join(f"{name} is {' and '.join(ways)}" for name, ways in higher.items())
     named = named[:1].upper() + named[1:] or "No difference between groups or sides was detected"
-    compared = f" {named}, at a level of 5 % over all of them together." if result["contrasts"] else ""
+    compared = f" {named} (level of 5 % for all comparisons together)." if result["contrasts"] else ""
     count = len({q["name"] for q in result["quantities"]})
     return f"{result['subjects']} subjects, {result['sessions']} sessions, {count} {'quantity' if count == 1 else 'quantities'}.{compared}"
+
+
+def _named(item: Mapping[str, Any]) -> str:
+    """Return the name of a quantity in words."""
+    return str(item["name"]).replace("_", " ")
 
 
 def quantities(result: Mapping[str, Any]) -> Table:
@@ -106,7 +115,7 @@ def quantities(result: Mapping[str, Any]) -> Table:
             " … ".join(tables.number(x, std) for x in q[name])
             for name, std in zip(("norm_low_interval", "norm_high_interval"), known, strict=True)
         ]
-        rows.append([q["name"], q["group"], q["unit"], q["subjects"], mean, between, within, f"{low} … {high}", *ends])
+        rows.append([_named(q), q["group"], q["unit"], q["subjects"], mean, between, within, f"{low} … {high}", *ends])
     head = [
         "quantity",
         "group",
@@ -116,8 +125,8 @@ def quantities(result: Mapping[str, Any]) -> Table:
         "std between",
         "std within",
         "norm band",
-        "its lower end",
-        "its upper end",
+        "its lower end lies in",
+        "its upper end lies in",
     ]
     return Table(head, rows, left=3)
 
@@ -126,8 +135,8 @@ def contrasts(result: Mapping[str, Any]) -> Table:
     """Return the differences between groups and between sides."""
     rows = [
         [
-            c["name"],
-            f"{c['between'][1]} less {c['between'][0]}",
+            _named(c),
+            f"{c['between'][1]} − {c['between'][0]}",
             c["unit"],
             f"{tables.number(c['difference'], c['std'])} ± {tables.spread(c['std'])}",
             " … ".join(tables.number(x, c["std"]) for x in c["interval"]),

@@ -137,9 +137,12 @@ def _history(courses: Sequence[Mapping[str, Any]], panel: tuple[float, float]) -
     for ax, course in zip(axes, courses, strict=False):
         place = np.arange(len(course["dates"]))
         colour = plotting.ORANGE if course["changed"] else plotting.BLUE
-        ax.errorbar(place, course["values"], 2.0 * np.asarray(course["stds"]), fmt="o-", color=colour, capsize=3)
+        factor, held_in = tables.read_followed(course["unit"])
+        values, bars = (factor * np.asarray(course[name]) for name in ("values", "stds"))
+        ax.errorbar(place, values, 2.0 * bars, fmt="o-", color=colour, capsize=3)
+        ax.margins(y=0.15)
         ax.set_xticks(place, course["dates"], rotation=30, ha="right", fontsize="small")
-        ax.set(title=f"{tables.typeset(tables.course_label(course))}{', changed' if course['changed'] else ''}", ylabel=course["unit"])
+        ax.set(title=f"{tables.typeset(tables.course_label(course))}{', changed' if course['changed'] else ''}", ylabel=held_in)
         ax.title.set_fontsize("small")
     for ax in axes[len(courses) :]:
         ax.remove()

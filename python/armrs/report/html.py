@@ -23,7 +23,7 @@ CONTENTS = Markup("<!-- contents -->")
 """Where a part of a page has its table of contents."""
 _PHONE = 640
 """Widest image that a phone shows whole [pixels]."""
-_BETWEEN_PARTS = re.compile(r"(?<=[\w\]])([._/])(?=[A-Za-z])")
+_BETWEEN_PARTS = re.compile(r"(?<=[\w\]]{2})([._/])(?=[A-Za-z]{2})")  # units have parts of one letter
 _HEADING = re.compile(r"<h2>(.*?)</h2>", flags=re.S)
 
 __all__ = [

@@ -159,6 +159,15 @@ def read_in(held_in: str) -> tuple[float, str]:
     return (1.0, unit(held_in)) if degrees is None else (math.degrees(1.0), degrees)
 
 
+def read_followed(held_in: str) -> tuple[float, str]:
+    """As `read_in`, of what is followed over sessions: times are latencies and delays, in milliseconds.
+
+    >>> read_followed("s")
+    (1000.0, 'ms')
+    """
+    return (1000.0, "ms") if held_in == "s" else read_in(held_in)
+
+
 def with_unit(written: str, held_in: str) -> str:
     """Return a number as written, with its unit: that of an angle stands at the number.
 
@@ -335,9 +344,11 @@ def _in_brackets(found: Mapping[str, Any]) -> str:
 
 
 def course_label(course: Mapping[str, Any]) -> str:
-    """Name a parameter that is followed or predicted, with the number of its joint."""
-    name = symbol(str(course["name"]))
-    return name if course["joint"] is None else f"{course['kind']} {course['joint']} {name}"
+    """Name a parameter that is followed, with the number of its joint; a symbol has it already."""
+    name, of, movement = str(course["name"]).partition(" in ")
+    if course["joint"] is None or course["kind"] in ("segment", "combination"):
+        return symbol(name) + of + movement
+    return f"{course['kind']} {name}, joint {course['joint']}".replace("_", " ") + of + movement
 
 
 def predictions(data: Mapping[str, Any]) -> Table:
@@ -423,17 +434,23 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
     rows = []
     for c in courses:
         several = c["change"] is not None and math.isfinite(c["change"])
-        cells = [
-            [f"{c[name]:+.2g} ± {c[f'{name}_std']:.2g}", probability(c[p]), "yes" if c[changed] else "no"] if several else ["–"] * 3
-            for name, p, changed in (("since_last", "since_last_p_value", "changed_since_last"), ("change", "p_value", "changed"))
-        ]
-        last = f"{c['values'][-1]:.4g} ± {c['stds'][-1]:.2g}"
-        rows.append([course_label(c), c["unit"], len(c["dates"]), last, *cells[0], *cells[1]])
-    columns = ["since the session before", "p (Holm)", "changed", "since all before", "p (Holm)", "changed"]
-    head = ["parameter", "unit", "sessions", "last ± std", *columns]
+        factor, held_in = read_followed(c["unit"])
+        cells = []
+        for name, p, changed in (("since_last", "since_last_p_value", "changed_since_last"), ("change", "p_value", "changed")):
+            tested = f"{'yes' if c[changed] else 'no'} (p {_chance(c[p])})" if several else "–"
+            cells += [_plus_minus(factor * c[name], factor * c[f"{name}_std"], "+") if several else "–", tested]
+        last = _plus_minus(factor * c["values"][-1], factor * c["stds"][-1])
+        rows.append([course_label(c), held_in, len(c["dates"]), last, *cells])
+    head = ["parameter", "unit", "sessions", "last ± std", "since the session before", "changed", "since all before", "changed"]
     # The session before is all before the second one.
-    shown = {0: 4, 1: 4, 2: 7}.get(max((len(c["dates"]) for c in courses), default=0), len(head))
+    shown = {0: 4, 1: 4, 2: 6}.get(max((len(c["dates"]) for c in courses), default=0), len(head))
     return Table(head[:shown], [row[:shown] for row in rows], left=2, symbols=True)
+
+
+def _plus_minus(value: float, std: float, sign: str = "") -> str:
+    """Write a value with its standard deviation, both to the same decimals; with `sign` "+" the sign of what is positive too."""
+    written = number(value, std)
+    return f"{sign if value >= 0.0 and sign else ''}{written} ± {spread(std)}"
 
 
 def comparison(data: Mapping[str, Any]) -> Table:

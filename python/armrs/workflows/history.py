@@ -18,6 +18,7 @@ from .. import checks
 from ..errors import BadInput, Text, show
 from ..io import files
 from ..io.dataset import Dataset
+from ..report.tables import course_label
 from ..tabular import Tabular, Tidy
 from .identify import Estimate
 
@@ -135,7 +136,7 @@ class Course:
     @property
     def label(self) -> str:
         """Name for people."""
-        return self.name if self.joint is None or self.kind in ("segment", "combination") else f"{self.kind} {self.joint} {self.name}"
+        return course_label({"name": self.name, "kind": self.kind, "joint": self.joint})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
