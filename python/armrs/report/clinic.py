@@ -521,11 +521,11 @@ def notes(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _number(value: float, line: Line | None = None) -> str:
-    """Write a number with one digit of its uncertainty, as sentences do, or three of its own."""
+    """Write a number with two digits of its uncertainty, as the norm and the change beside it, or three of its own."""
     width = 0.0 if line is None or line.interval is None else 0.25 * (line.interval[1] - line.interval[0])
-    size = width if width > 0.0 else 0.01 * abs(value)
+    size = width if width > 0.0 else 0.1 * abs(value)
     finest = 3 if line is None or line.quantity.unit != "°" else 1
-    decimals = 0 if size <= 0.0 else min(max(-math.floor(math.log10(size)), 0), finest)
+    decimals = 0 if size <= 0.0 else min(max(1 - math.floor(math.log10(size)), 0), finest)
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
