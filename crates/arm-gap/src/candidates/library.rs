@@ -263,7 +263,7 @@ fn ask<const N: usize>(
             }
             shape
         };
-        // The robot and the shoulder swing slowly, muscles do not.
+        // The robot and the shoulder may swing more slowly than muscles.
         let occurs = |wave: &&[f64; 2]| nature != Nature::Rhythm || wave[0] >= SLOWEST_RHYTHM;
         shapes = waves.iter().filter(occurs).map(shape).collect();
     }

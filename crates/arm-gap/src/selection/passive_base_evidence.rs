@@ -9,7 +9,7 @@ use crate::selection::friction_at_rest::TRIED_AT_REST;
 /// Square of the standard deviations from zero beyond which a law stays once it was refitted by simulation, 2,
 pub(super) const STAYS: f64 = 4.0;
 /// and what it must gain at least to be named, 3: with nine such laws an arm without any has a false name in one of eighty sessions.
-pub(crate) const NAMED: f64 = 9.0;
+const NAMED: f64 = 9.0;
 /// What speaks for a law that every passive joint has against one that few have, in units of twice the log-likelihood: odds of 20.
 pub(super) const ODDS: f64 = 6.0;
 

@@ -323,14 +323,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for _ in 0..TURNS {
             let fresh = |members: &[usize], c: usize| {
                 let candidate = &library.candidates[c];
-                let same = |other: &Candidate| other.is_same_question(candidate);
                 let is_plainer = |other: &Candidate| other.is_same_effect(&candidate.effect);
-                // Families before members: two laws of a family bend to what one of them shows. A second one is asked for in a round of its own.
                 // All that is asked of what swings has the same frequency and phase: one thing makes it.
                 let is_asked = |other: &Candidate| {
-                    let both_swing = [other, candidate].map(|c| c.kind().prior().nature.swings());
-                    same(other) || both_swing == [true, true]
+                    let swings = |c: &Candidate| c.kind().prior().nature.swings();
+                    other.is_same_question(candidate) || swings(other) && swings(candidate)
                 };
+                // Families before members: two laws of a family bend to what one of them shows. A second one is asked for in a round of its own.
                 let is_kin = |other: &Candidate| {
                     is_asked(other) || other.is_of_family_in_joint(&candidate.effect)
                 };

@@ -1,4 +1,4 @@
-//! What swings slowly and in phase in all trials: the robot or the shoulder. Movements have power of their own where it swings, so that
+//! What swings slowly and in phase in all trials: the robot, the shoulder, a muscle. Movements have power of their own where it swings, so that
 //! it is no line in a spectrum; it is asked as other effects are, frequency by frequency.
 
 use core::f64::consts::FRAC_PI_2;
