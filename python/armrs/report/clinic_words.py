@@ -107,7 +107,7 @@ def quantities(result: Mapping[str, Any]) -> Table:
     """Return mean, scatter between and within subjects, and the norm band of each quantity."""
     rows = []
     for q in result["quantities"]:
-        mean = f"{tables.number(q['mean'], q['mean_std'])} ± {tables.spread(q['mean_std'])}"
+        mean = tables.plus_minus(q["mean"], q["mean_std"])
         between, within = (tables.number(q[name], 0.1 * q[name] if q[name] else None) for name in ("between_std", "within_std"))
         known = [0.25 * (q[name][1] - q[name][0]) for name in ("norm_low_interval", "norm_high_interval")]
         low, high = (tables.number(x, std) for x, std in zip(q["norm"], known, strict=True))
@@ -138,7 +138,7 @@ def contrasts(result: Mapping[str, Any]) -> Table:
             _named(c),
             f"{c['between'][1]} − {c['between'][0]}",
             c["unit"],
-            f"{tables.number(c['difference'], c['std'])} ± {tables.spread(c['std'])}",
+            tables.plus_minus(c["difference"], c["std"]),
             " … ".join(tables.number(x, c["std"]) for x in c["interval"]),
             f"{c['p_value']:.2g}",
         ]

@@ -82,7 +82,7 @@ def _measured_in_joints(data: Mapping[str, Any], joints: Sequence[str]) -> list[
     """Return what the measurement says of each joint: its number, and words."""
     items = [p for p in data["parameters"] if p["joint"] and p["kind"] not in ("segment", "combination") and p["decided_by"] == "data"]
     return [
-        (p["joint"], f"{joints[p['joint'] - 1]}: {tables.label(p)} {tables.number(p['value'], p['std'])} ± {tables.spread(p['std'])} "
+        (p["joint"], f"{joints[p['joint'] - 1]}: {tables.label(p)} {tables.plus_minus(p['value'], p['std'])} "
          f"{tables.unit(p['unit'])}") for p in items
     ]  # fmt: skip
 

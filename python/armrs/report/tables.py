@@ -211,6 +211,15 @@ def spread(std: float | None) -> str:
     return f"{std:.{digits}f}" if std > 0 and digits <= _MOST_DECIMALS else f"{std:.2g}"
 
 
+def plus_minus(value: float, std: float | None, sign: str = "") -> str:
+    """Write a value with its standard deviation, both to the same decimals; with `sign` "+" the sign of what is positive too.
+
+    >>> plus_minus(0.1613, 0.006, "+")
+    '+0.1613 ± 0.0060'
+    """
+    return f"{sign if sign and value >= 0.0 else ''}{number(value, std)} ± {spread(std)}"
+
+
 def _decimals(std: float) -> int:
     """Decimals that show two digits of a standard deviation."""
     exponent = int(f"{std:.1e}".partition("e")[2])
@@ -438,19 +447,13 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
         cells = []
         for name, p, changed in (("since_last", "since_last_p_value", "changed_since_last"), ("change", "p_value", "changed")):
             tested = f"{'yes' if c[changed] else 'no'} (p {_chance(c[p])})" if several else "–"
-            cells += [_plus_minus(factor * c[name], factor * c[f"{name}_std"], "+") if several else "–", tested]
-        last = _plus_minus(factor * c["values"][-1], factor * c["stds"][-1])
+            cells += [plus_minus(factor * c[name], factor * c[f"{name}_std"], "+") if several else "–", tested]
+        last = plus_minus(factor * c["values"][-1], factor * c["stds"][-1])
         rows.append([course_label(c), held_in, len(c["dates"]), last, *cells])
     head = ["parameter", "unit", "sessions", "last ± std", "since the session before", "changed", "since all before", "changed"]
     # The session before is all before the second one.
     shown = {0: 4, 1: 4, 2: 6}.get(max((len(c["dates"]) for c in courses), default=0), len(head))
     return Table(head[:shown], [row[:shown] for row in rows], left=2, symbols=True)
-
-
-def _plus_minus(value: float, std: float, sign: str = "") -> str:
-    """Write a value with its standard deviation, both to the same decimals; with `sign` "+" the sign of what is positive too."""
-    written = number(value, std)
-    return f"{sign if value >= 0.0 and sign else ''}{written} ± {spread(std)}"
 
 
 def comparison(data: Mapping[str, Any]) -> Table:

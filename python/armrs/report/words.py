@@ -303,7 +303,7 @@ def couplings(result: Mapping[str, Any]) -> list[str]:
     found = result.get("couplings", ())
     lines = [
         f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: "
-        f"{tables.number(c['value_Nm_rad'], c['std_Nm_rad'])} ± {tables.spread(c['std_Nm_rad'])} N m/rad, from the moments of both joints "
+        f"{tables.plus_minus(c['value_Nm_rad'], c['std_Nm_rad'])} N m/rad, from the moments of both joints "
         f"(± is one standard deviation, p = {c['p_value']:.2g})."
         for c in found
     ]

@@ -10,7 +10,7 @@ from ...catalogue import Kind, catalogue, title
 from ...report import plotting
 from ...report.figures import Drawn
 from ...report.sketch import sketch
-from ...report.tables import number, read_in, spread, with_unit
+from ...report.tables import plus_minus, read_in, with_unit
 from .found import GapFound
 from .headline import largest, left, only_near, place_of, rank, shown_in, still_open
 
@@ -98,7 +98,7 @@ def _words(effect: Missing) -> str:
     value = None if name is None else effect.parameters[name]
     if value is not None and value.std is not None:
         factor, held_in = read_in(value.unit)
-        text += f" {number(factor * value.value, factor * value.std)} ± {spread(factor * value.std)} {held_in}".rstrip()
+        text += f" {plus_minus(factor * value.value, factor * value.std)} {held_in}".rstrip()
     return text + (" (one trial)" if effect.trial else "")
 
 
