@@ -244,6 +244,20 @@ def test_worn_masses_keep_identify_and_gap_from_an_arm(session: Path, tmp_path: 
     assert found.errors[0].text.startswith(refused)
 
 
+def test_a_report_is_made_of_the_json_of_a_check_and_an_import(session: Path, tmp_path: Path) -> None:
+    """They are among the results that a report names, and theirs were refused: "not what a result holds ('data')"."""
+    KNOWN.write(tmp_path / "model.toml")
+    raw = [str(path) for path in sorted(session.glob("trials/*.csv"))]
+    importing = ["import", *raw, "--model", str(tmp_path / "model.toml"), "-o", str(tmp_path / "set"), "--force-on", "robot"]
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "dataset.toml").write_text("name = 3\n", encoding="utf-8")
+    for name, verb in (("check", ["check", str(session)]), ("unread", ["check", str(tmp_path / "broken")]), ("import", importing)):
+        result = tmp_path / f"{name}.json"
+        assert cli.main([*verb, "--json", str(result)]) == int(name == "unread")
+        assert cli.main(["report", str(result), "-o", str(tmp_path / name)]) == 0
+        assert f"armrs {verb[0]} " in (tmp_path / name / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("name", ["session", "pendulum_single", "pendulum_triple", "dfki_a0", "dfki_c1"])
 def test_check_says_of_passive_what_passive_says(name: str, request: pytest.FixtureRequest) -> None:
     """Of free swings it said that passive can use them, which found nothing there; and whether a movement is slow had two rules."""

@@ -133,6 +133,8 @@ def test_a_share_of_an_angle_is_not_stated() -> None:
     """Its zero is a convention."""
     assert session_changes.trend(-5.0, 1.23, None, clear=True) == "lower by 5.0 ± 1.2"
     assert session_changes.trend(-5.0, 1.23, 20.0, clear=True) == "lower by 5.0 ± 1.2 (−25 %)"
+    # Rounded, the uncertainty has a digit more: it was 0.0100.
+    assert session_changes.trend(0.0, 0.00999, None, clear=False) == "no clear change: +0.000 ± 0.010"
 
 
 def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> None:

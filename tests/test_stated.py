@@ -100,6 +100,16 @@ def test_what_is_followed_has_the_names_and_units_of_the_page_it_stands_on() -> 
     assert len(tables.history([{**threshold, "dates": ["a"], "change": None, "p_value": None}]).head) == 4
 
 
+def test_moments_that_depend_on_both_angles_may_be_a_wrong_mass() -> None:
+    """The demonstration, whose joints are not coupled and whose model is too heavy, was told that they are."""
+    found = {"joint_names": ["shoulder", "elbow"], "coupled": True, "value_Nm_rad": 0.0449, "std_Nm_rad": 0.002, "p_value": 2e-11}
+    said, why = common.couplings({"couplings": [found]})
+    assert said.startswith("shoulder and elbow: the elastic moment of each depends on the angle of the other, 0.0449 ± 0.0020 N m/rad")
+    assert "Tissue that spans both joints" in why and "A wrong mass or centre of mass in the model does the same" in why
+    [said] = common.couplings({"couplings": [found | {"coupled": False}]})
+    assert "no dependence of the elastic moment of one on the angle of the other was detected" in said
+
+
 def test_a_difference_between_groups_has_a_direction() -> None:
     """The page of a cohort said that they differ, once for the groups and once for the sides."""
 

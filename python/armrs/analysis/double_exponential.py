@@ -64,15 +64,24 @@ class Shape:
     ----------
     values : ndarray, shape (7,)
         In the order of `NAMES`; the steepness and ratio of an exponential that is not there are zero.
-    stds : ndarray, shape (7,)
-        Of a steepness, of its logarithm.
+    covariances : ndarray, shape (2, 7, 7)
+        By leaving out one trial at a time, and by the noise with what is known beforehand; of a steepness, of its logarithm.
     squares : float
         Sum of squares that is left within trials [N² m²].
     """
 
     values: np.ndarray
-    stds: np.ndarray
+    covariances: np.ndarray
     squares: float
+
+    @property
+    def stds(self) -> np.ndarray:
+        """Standard deviations of the values, shape (7,); of a steepness, of its logarithm."""
+        return np.array([self.deviation(row) for row in np.eye(7)])
+
+    def deviation(self, slopes: np.ndarray) -> float:
+        """Return the standard deviation of what depends on the values with these slopes, (7,): the larger one of both covariances."""
+        return float(np.sqrt(max(*np.einsum("i,kij,j->k", slopes, self.covariances, slopes), 0.0)))
 
     def interval(self, number: int, quantile: float) -> tuple[float, float]:
         """Return the interval of a value, with a quantile of its distribution."""
@@ -188,12 +197,13 @@ class Problem:
             line = self._columns(np.zeros(7))[:, 2]
             values = np.array([0.0, 0.0, line @ self.moment / (line @ line), 0.0, 0.0, 0.0, 0.0])
         residual = self.moment - self._model(values)
-        stds = np.zeros(7)
-        stds[free] = self._deviations(self._jacobian(values)[:, free], residual, variance, free)
-        return Shape(values, stds, float(residual @ residual))
+        covariances = np.zeros((2, 7, 7))
+        own, others = np.ix_(free, free)
+        covariances[:, own, others] = self._covariances(self._jacobian(values)[:, free], residual, variance, free)
+        return Shape(values, covariances, float(residual @ residual))
 
-    def _deviations(self, jacobian: np.ndarray, residual: np.ndarray, variance: float, free: np.ndarray) -> np.ndarray:
-        """Return deviations by leaving out one trial at a time, linearised; at least those of the noise and of what is known beforehand."""
+    def _covariances(self, jacobian: np.ndarray, residual: np.ndarray, variance: float, free: np.ndarray) -> np.ndarray:
+        """Return the covariances by leaving out one trial at a time, linearised, and by the noise and what is known beforehand."""
         known = variance * np.array([0.0, 0.0, 0.0, *[STEEPNESS_STD**-2] * 2, *[RATIO_STD**-2] * 2])[free]
         scale = np.linalg.norm(jacobian, axis=0) + 1e-300
         scaled = jacobian / scale
@@ -202,8 +212,8 @@ class Problem:
         inverses = np.linalg.pinv(np.array([whole - part.T @ part for part, _ in parts]), hermitian=True)
         away = np.array([inverse @ (part.T @ rest) for inverse, (part, rest) in zip(inverses, parts, strict=True)])
         moved = away - away.mean(axis=0)
-        jackknife = (self.count - 1) / self.count * np.sum(moved**2, axis=0)
-        return np.asarray(np.sqrt(np.maximum(jackknife, variance * np.diag(np.linalg.pinv(whole, hermitian=True)))) / scale)
+        jackknife = (self.count - 1) / self.count * moved.T @ moved
+        return np.stack([jackknife, variance * np.linalg.pinv(whole, hermitian=True)]) / np.outer(scale, scale)
 
     def _columns(self, values: np.ndarray) -> np.ndarray:
         return self._within(columns(self.q, self.adjacent, values, self.ends))
@@ -212,16 +222,8 @@ class Problem:
         return np.asarray(self._columns(values) @ values[:3])
 
     def _jacobian(self, values: np.ndarray) -> np.ndarray:
-        """Return the derivatives to all values, those of a steepness to its logarithm, shape (n, 7)."""
-        upper, lower, _, k_u, k_l, r_u, r_l = values
-        high, low, line = columns(self.q, self.adjacent, values, self.ends).T
-        (q_lo, q_hi), a = self.ends, self.adjacent
-        rising, falling = upper * k_u * high, lower * k_l * -low
-        return self._within(
-            np.stack([
-                high, low, line, rising * (self.q + r_u * a - q_hi), falling * (self.q + r_l * a - q_lo), rising * a, falling * a
-            ], axis=1)
-        )  # fmt: skip
+        """Return what `derivatives` does, as far as it counts, shape (n, 7)."""
+        return self._within(derivatives(self.q, self.adjacent, values, self.ends))
 
     def share(self, one: Shape, other: Shape) -> float:
         """Return by how much two shapes differ beyond what shared errors may be, relative to the moments, both as root mean squares."""
@@ -248,6 +250,15 @@ def columns(q: np.ndarray, adjacent: np.ndarray | float, values: np.ndarray, end
     rising = np.exp(k_u * (q + r_u * adjacent - high)) if k_u > 0.0 else np.zeros_like(q)
     falling = -np.exp(-k_l * (q + r_l * adjacent - low)) if k_l > 0.0 else np.zeros_like(q)
     return np.stack([rising, falling, q - 0.5 * (low + high)], axis=-1)
+
+
+def derivatives(q: np.ndarray, adjacent: np.ndarray | float, values: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """Return the derivatives of a shape to all values, those of a steepness to its logarithm, shape (n, 7)."""
+    upper, lower, _, k_u, k_l, r_u, r_l = values
+    high, low, line = columns(q, adjacent, values, ends).T
+    rising, falling = upper * k_u * high, lower * k_l * -low
+    own = (rising * (q + r_u * adjacent - ends[1]), falling * (q + r_l * adjacent - ends[0]))
+    return np.stack([high, low, line, *own, rising * adjacent, falling * adjacent], axis=1)
 
 
 def _noise(courses: Sequence[Course]) -> float:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from . import students_t
-from .double_exponential import NAMES, UNITS, Course, Problem, Shape, columns
+from .double_exponential import NAMES, UNITS, Course, Problem, Shape, columns, derivatives
 
 LEAST_HELD = np.radians(5.0)
 """The adjacent angle must differ by this much between configurations before a dependence on it can be told [rad]."""
@@ -260,15 +260,27 @@ def _fitted(asked: _Asked, joint: int, adjacent: int, level: float, linear_p_val
 
 
 def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:
-    """Return the line of what a shape leaves of whole trials, against the adjacent angle."""
+    """Return the line of what a shape leaves of whole trials, against the adjacent angle.
+
+    Where a joint moves through other angles while the adjacent one is held elsewhere, its own spring changes the levels as a coupling
+    does: an error of the shape is one of the slope.
+    """
     away = np.array([c.adjacent for c in courses]) - problem.mean
     own = [c.moment - columns(c.angle, a, shape.values, problem.ends) @ shape.values[:3] for c, a in zip(courses, away, strict=True)]
-    return _line(away, np.array([np.mean(values) for values in own]), [c.configuration for c in courses])
+    line = _line(away, np.array([np.mean(values) for values in own]), [c.configuration for c in courses])
+    by_shape = [derivatives(c.angle, a, shape.values, problem.ends).mean(axis=0) for c, a in zip(courses, away, strict=True)]
+    slope, level = (shape.deviation(shares @ np.array(by_shape)) for shares in (line.slope_shares, line.level_shares))
+    return line.with_more(slope, level, _freedom(shape, len(courses)))
+
+
+def _freedom(shape: Shape, count: int) -> int:
+    """Return the degrees of freedom of the deviations of a shape that was fitted to so many trials."""
+    return max(count - int(np.count_nonzero(shape.stds)), 1)
 
 
 def _coefficients(shape: Shape, count: int, level: float) -> list[Coefficient]:
     """Return the numbers of a shape; of a steepness, the deviation is that of its logarithm times it."""
-    quantile = students_t.quantile(level, max(count - int(np.count_nonzero(shape.stds)), 1))
+    quantile = students_t.quantile(level, _freedom(shape, count))
     stds = shape.stds * np.where(np.char.endswith(NAMES, "steepness"), shape.values, 1.0)
     return [
         Coefficient(name, float(value), float(std), shape.interval(number, quantile), unit)
@@ -291,14 +303,19 @@ def _of_line(name: str, value: float, std: float, unit: str, known: tuple[float,
 
 
 def together(first: Dependence, second: Dependence) -> Coupling:
-    """Return the coupling of two joints that were each moved while the other was held at different angles."""
+    """Return the coupling of two joints that were each moved while the other was held at different angles.
+
+    Both are weighted by variances that are estimated, which makes that of their mean look too small (Meier 1953).
+    """
     stds = np.array([first.mean_coupling.std, second.mean_coupling.std])
     values = np.array([first.mean_coupling.value, second.mean_coupling.value])
     known = (stds == 0.0).astype(float) if not stds.all() else stds**-2
     weights = known / known.sum()
     shares = (weights * stds) ** 2
-    value, std = float(weights @ values), float(np.sqrt(shares.sum()))
-    freedom = float(shares.sum() ** 2 / np.sum(shares**2 / np.array([first.freedom, second.freedom]))) if std > 0.0 else first.freedom
+    own = np.array([first.freedom, second.freedom])
+    meier = 1.0 + 4.0 * float(np.sum(weights * (1.0 - weights) / own))
+    value, std = float(weights @ values), float(np.sqrt(shares.sum() * meier))
+    freedom = float(shares.sum() ** 2 / np.sum(shares**2 / own)) if std > 0.0 else first.freedom
     half = students_t.quantile(first.level, freedom) * std
     pair = (min(first.joint, second.joint), max(first.joint, second.joint))
     return Coupling(pair, value, std, (value - half, value + half), students_t.chance(value, std, freedom), first.level)
@@ -306,14 +323,26 @@ def together(first: Dependence, second: Dependence) -> Coupling:
 
 @dataclass(frozen=True)
 class _Line:
-    """A line through trials: slope and level at zero with deviations, scatter about it, degrees of freedom of the slope's deviation."""
+    """A line through trials: slope and level at zero with deviations, scatter about it, degrees of freedom of the slope's deviation.
 
+    The shares, (n_trials,), are what the slope and the level are of the values of the trials.
+    """
+
+    slope_shares: np.ndarray
+    level_shares: np.ndarray
     slope: float
     slope_std: float
     level: float
     level_std: float
     spread: float
     freedom: float
+
+    def with_more(self, slope: float, level: float, freedom: float) -> _Line:
+        """Return the line with more deviation of slope and level, of so many degrees of freedom (Satterthwaite 1946)."""
+        variances = np.array([self.slope_std, slope]) ** 2
+        total = float(variances.sum())
+        joined = total**2 / float(np.sum(variances**2 / np.array([self.freedom, freedom]))) if total > 0.0 else self.freedom
+        return replace(self, slope_std=float(np.sqrt(total)), level_std=float(np.hypot(self.level_std, level)), freedom=joined)
 
 
 def _line(x: np.ndarray, y: np.ndarray, configurations: Sequence[str]) -> _Line:
@@ -330,16 +359,19 @@ def _line(x: np.ndarray, y: np.ndarray, configurations: Sequence[str]) -> _Line:
     common = float(about @ about) / (len(x) - 2)
     variance = (_SHARED * common + own) / (_SHARED + counts - 1)
     if common == 0.0:
-        return _Line(float(x @ y / (x @ x)), 0.0, float(y.mean()), 0.0, 0.0, float(len(x) - 2))
+        shares = x / (x @ x), np.full(len(x), 1.0 / len(x))
+        return _Line(*shares, float(shares[0] @ y), 0.0, float(y.mean()), 0.0, 0.0, float(len(x) - 2))
     weights = counts / variance
     centre = float(weights @ at / weights.sum())
     part = weights * (at - centre) / float(weights @ (at - centre) ** 2)
-    shares = part**2 * variance / counts
-    total = float(shares.sum())
-    relative = shares / total
+    variances = part**2 * variance / counts
+    total = float(variances.sum())
+    relative = variances / total
     meier = 1.0 + 4.0 * float(np.sum(relative * (1.0 - relative) * (counts - 1) / (_SHARED + counts - 1) ** 2))
     slope, slope_variance = float(part @ mean), total * meier
-    level = float(weights @ mean / weights.sum()) - slope * centre
+    even = weights / weights.sum() - centre * part
+    level = float(even @ mean)
     level_variance = 1.0 / float(weights.sum()) + centre**2 * slope_variance
     freedom = min(1.0 / float(np.sum(relative**2 / (_SHARED + counts - 1))), float(len(x) - 2))
-    return _Line(slope, float(np.sqrt(slope_variance)), level, float(np.sqrt(level_variance)), float(np.sqrt(common)), freedom)
+    shares = (part / counts)[place], (even / counts)[place]
+    return _Line(*shares, slope, float(np.sqrt(slope_variance)), level, float(np.sqrt(level_variance)), float(np.sqrt(common)), freedom)

@@ -7,13 +7,13 @@ import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from ..errors import BadInput, BadInputs, Text
 from ..report import console
-from .common import JsonFile, OutFolder, Source, listed, on_a_terminal, present, writable
+from .common import JsonFile, OutFolder, Source, command_line, listed, on_a_terminal, present, writable
 
 if TYPE_CHECKING:
     from ..model import Robot
@@ -179,6 +179,7 @@ def _worn(text: str) -> Worn:
 
 
 def import_(
+    context: typer.Context,
     sources: Annotated[list[Path], typer.Argument(metavar="RAW…", help="Recordings, folders of recordings, or one import.toml.")],
     out: OutFolder,
     model: Annotated[
@@ -240,6 +241,11 @@ def import_(
 
     picture = write_recording(load_dataset(done.folder), done.folder)
 
+    def data() -> Any:
+        from ..report.data_sets import imported_data
+
+        return imported_data(done, command_line(context))
+
     def human() -> None:
         for note in done.notes:
             print(f"  {note}")
@@ -250,7 +256,7 @@ def import_(
         print(f"Wrote {count} trial{'s' * (count > 1)} to {done.folder}.")
         print(f"Look at {picture}: does the arm stand as in the laboratory, and does the force support it?")
 
-    present(done.to_dict, json, human, f"armrs check {shlex.quote(str(done.folder))}")
+    present(data, json, human, f"armrs check {shlex.quote(str(done.folder))}")
     return 1 if done.warnings else 0
 
 
@@ -304,7 +310,7 @@ def _after_check(done: Checked, dataset: Path) -> str:
     return ", then ".join(able) or "record forces or joint torques beside the angles"
 
 
-def check(dataset: Source, json: JsonFile = None) -> int:
+def check(context: typer.Context, dataset: Source, json: JsonFile = None) -> int:
     """List every problem of a data set at once, and what each verb can determine from it.
 
     Exit status 1 if a problem prevents a verb from using the data.
@@ -314,6 +320,11 @@ def check(dataset: Source, json: JsonFile = None) -> int:
     with console.stages("checking") as tell:
         done = check_dataset(dataset, progress=tell)
 
+    def data() -> Any:
+        from ..report.data_sets import checked_data
+
+        return checked_data(done, command_line(context))
+
     def human() -> None:
         for problem in grouped(done.problems):
             print(f"{problem.level}: {problem}")
@@ -321,5 +332,5 @@ def check(dataset: Source, json: JsonFile = None) -> int:
             print()
         console.table(("verb", "can", "why"), [(v.verb, "yes" if v.able else "no", v.why) for v in done.verbs], left=3)
 
-    present(done.to_dict, json, human, _after_check(done, dataset))
+    present(data, json, human, _after_check(done, dataset))
     return 1 if done.errors else 0

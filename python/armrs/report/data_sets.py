@@ -75,14 +75,14 @@ def _of(dataset: Dataset | None, name: str) -> dict[str, Any]:
     return {"name": name, "synthetic": False} if dataset is None else plain.data_of(dataset)
 
 
-def checked_data(result: Checked) -> dict[str, Any]:
-    """Return a check as a report reads it."""
-    return {**result.to_dict(), "data": _of(result.dataset, "a data set that cannot be read"), "made_by": plain.origin(None)}
+def checked_data(result: Checked, command: str | None = None) -> dict[str, Any]:
+    """Return a check as it is written to JSON."""
+    return {**result.to_dict(), "data": _of(result.dataset, "a data set that cannot be read"), "made_by": plain.origin(command)}
 
 
-def imported_data(result: Imported) -> dict[str, Any]:
-    """Return an import as a report reads it."""
-    return {**result.to_dict(), "data": _of(load_dataset(result.folder), result.folder.name), "made_by": plain.origin(None)}
+def imported_data(result: Imported, command: str | None = None) -> dict[str, Any]:
+    """Return an import as it is written to JSON."""
+    return {**result.to_dict(), "data": _of(load_dataset(result.folder), result.folder.name), "made_by": plain.origin(command)}
 
 
 def recorded_data(result: Recorded) -> dict[str, Any]:

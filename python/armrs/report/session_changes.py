@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
+from .tables import two_digits
+
 NO_CHANGE = "no clear change"
 CLEAR = ("higher", "lower")
 """How the words of a clear change begin."""
@@ -44,7 +46,7 @@ class Row(Protocol):
 def trend(change: float, either_way: float, before: float | None, *, clear: bool) -> str:
     """Say a change: by how much, both with the digits of its uncertainty, and as a share of `before`, where that means something."""
     size = either_way if either_way > 0.0 and math.isfinite(either_way) else abs(change)
-    decimals = max(1 - math.floor(math.log10(size)), 0) if size > 0.0 else 0
+    decimals = two_digits(size) if size > 0.0 else 0
     width = f"{either_way:.{decimals}f}"
     if not clear:
         return f"{NO_CHANGE}: {change:+.{decimals}f} ± {width}".replace("-", "−")

@@ -183,7 +183,7 @@ def number(value: float | None, std: float | None) -> str:
         return "–"
     if not std or not std > 0:
         return f"{value:.4g}"
-    digits = _decimals(std)
+    digits = two_digits(std)
     # Adding zero turns a rounded -0 into 0.
     return f"{round(value, digits) + 0.0:.{digits}f}" if digits <= _MOST_DECIMALS else f"{value:.3g}"
 
@@ -207,7 +207,7 @@ def spread(std: float | None) -> str:
     """Write a standard deviation with two digits."""
     if std is None:
         return "–"
-    digits = _decimals(std) if std > 0 else 0
+    digits = two_digits(std) if std > 0 else 0
     return f"{std:.{digits}f}" if std > 0 and digits <= _MOST_DECIMALS else f"{std:.2g}"
 
 
@@ -220,7 +220,7 @@ def plus_minus(value: float, std: float | None, sign: str = "") -> str:
     return f"{sign if sign and value >= 0.0 else ''}{number(value, std)} ± {spread(std)}"
 
 
-def _decimals(std: float) -> int:
+def two_digits(std: float) -> int:
     """Decimals that show two digits of a standard deviation."""
     exponent = int(f"{std:.1e}".partition("e")[2])
     return max(0, 1 - exponent)

@@ -50,9 +50,9 @@ PREDICTED = (
     "model lacks is in neither. Relative: ± std of the data divided by the value; a small parameter of an effect counts as 0.05."
 )
 
-WRONG_MASS = (
-    "A wrong mass or centre of mass in the model looks like a coupling too: the gravity moment depends on the sum of both angles, and so "
-    "does an error in it."
+COUPLING_OR_MASS = (
+    "Tissue that spans both joints couples them. A wrong mass or centre of mass in the model does the same, because the gravity moment "
+    "depends on the sum of both angles: compare with the first moments of armrs identify."
 )
 
 
@@ -298,16 +298,22 @@ def passive(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     files_written(written)
 
 
+_COUPLED = {
+    True: "the elastic moment of each depends on the angle of the other",
+    False: "no dependence of the elastic moment of one on the angle of the other was detected",
+}
+
+
 def couplings(result: Mapping[str, Any]) -> list[str]:
     """Say for each pair of joints whether their elastic moments depend on one another."""
     found = result.get("couplings", ())
     lines = [
-        f"{' and '.join(c['joint_names'])} {'are' if c['coupled'] else 'show no sign of being'} coupled: "
+        f"{' and '.join(c['joint_names'])}: {_COUPLED[c['coupled']]}, "
         f"{tables.plus_minus(c['value_Nm_rad'], c['std_Nm_rad'])} N m/rad, from the moments of both joints "
         f"(± is one standard deviation, p = {c['p_value']:.2g})."
         for c in found
     ]
-    lines += [WRONG_MASS] * any(c["coupled"] for c in found)
+    lines += [COUPLING_OR_MASS] * any(c["coupled"] for c in found)
     moving = [d for d in result.get("dependence", ()) if not d["linear"]]
     return lines + [
         f"{d['joint_name']}: the linear law is not enough; the ends of its range move with the {d['adjacent_name']}." for d in moving
