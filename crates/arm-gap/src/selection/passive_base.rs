@@ -200,8 +200,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn with_base_instead(
         &mut self,
         current: &Fitted<N>,
+        point: &LinearizationPoint<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
         let (before, first) = (self.dropped.clone(), self.session.effects.len());
+        let base = self.gains_of_base(point, current)?;
         for (slot, own) in current.asked.iter().enumerate() {
             let crosses = own.kind().crosses();
             let in_joint =
@@ -230,8 +232,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             } else {
                 shapes
             };
+            // A shape may stand for what the law of another one misses.
+            let bent = self.mimicked_beside((current, slot, current), &base, point);
             if let Ok((fitted, point)) = self.settle(start, asked)
-                && fitted.cost < current.cost + price
+                && fitted.cost < current.cost + f64::max(price, bent)
             {
                 return Ok(Some((fitted, point)));
             }

@@ -111,6 +111,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 (state.asked, state.scale, periodic),
                 progress,
             )?;
+            if turn < TURNS
+                && let Some(instead) = self.with_base_instead(&state.current, &state.point)?
+            {
+                state = self.with_base_changed(state, instead, periodic, progress)?;
+                continue;
+            }
             let after = kinds(&state.current);
             let rounds = state.search_trace.len();
             if turn < TURNS && after != before && !outcomes.contains(&after) {
@@ -202,18 +208,25 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Goes on from laws of the passive base that came back once something else was named, or that stand in for it.
     fn with_base_reconsidered(
         &mut self,
-        mut state: SearchState<'a, N>,
+        state: SearchState<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
-        let mut revived = self.with_base_revived(&state.current)?;
-        if revived.is_none() {
-            revived = self.with_base_instead(&state.current)?;
+        let revived = self.with_base_revived(&state.current)?;
+        match revived.or_else(|| self.with_one_dry_law(&state.current, state.scale)) {
+            Some(revived) => self.with_base_changed(state, revived, periodic, progress),
+            None => Ok(state),
         }
-        let revived = revived.or_else(|| self.with_one_dry_law(&state.current, state.scale));
-        let Some(revived) = revived else {
-            return Ok(state);
-        };
+    }
+
+    /// Goes on from what was found with other laws of the passive base.
+    fn with_base_changed(
+        &mut self,
+        mut state: SearchState<'a, N>,
+        revived: Settled<'a, N>,
+        periodic: Option<[f64; 2]>,
+        progress: Progress<'_>,
+    ) -> Result<SearchState<'a, N>, GapError> {
         let known = revived.0.hypothesis.known.clone();
         self.start = Some(Hypothesis {
             known: known.clone(),
