@@ -69,8 +69,9 @@ def test_sessions_compare_when_the_data_decided_the_same(identified: Identified,
 
 def test_the_same_session_replaces_itself_and_order_is_by_date(identified: Identified, tmp_path: Path) -> None:
     file = tmp_path / "subject.sqlite"
-    sessions.add(file, identified, "2026-03-01")
-    sessions.add(file, identified, "2026-03-01")
+    assert not sessions.add(file, identified, "2026-03-01").warnings
+    (line,) = sessions.add(file, identified, "2026-03-01").warnings
+    assert "on 2026-03-01 is replaced" in line
     courses = sessions.add(file, identified, "2026-01-01").courses
     assert all(c.dates == ("2026-01-01", "2026-03-01") and c.change == 0.0 for c in courses)
 

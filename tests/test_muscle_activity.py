@@ -13,7 +13,7 @@ import pytest
 
 import armrs
 from armrs.analysis import repeated
-from armrs.io.muscle_activity import co_contraction, comparable, joint_activity, mark_activity
+from armrs.io.muscle_activity import _applied, co_contraction, comparable, joint_activity, mark_activity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import check_passive
@@ -166,6 +166,23 @@ def test_a_marked_burst_moves_passive_moments_by_the_noise_of_what_is_lost() -> 
     assert np.sqrt(np.mean(leaked**2)) < 0.01
     assert np.sqrt(np.mean(left**2)) < 0.07 and np.mean(np.abs(left) < 0.1) > 0.9
     assert abs(left.mean()) < 3.0 * left.std(ddof=1) / np.sqrt(left.size)
+
+
+def test_one_line_says_in_which_trials_muscles_are_active_and_for_how_long() -> None:
+    quiet = disturbed_session(120)[0].trials
+    times = [np.zeros(len(trial), dtype=bool) for trial in quiet]
+    for active, samples in zip(times[:2], (20, 60), strict=True):
+        active[10 : 10 + samples] = True
+    marked, lines = _applied(quiet, times, [])
+    least, most = (f"{n * quiet[0].dt:.2g}" for n in (20, 60))
+    assert lines == [f"{quiet[0].file} and {quiet[1].file}: muscles are active for {least} to {most} s; only spasticity uses these samples"]
+    assert [int((~trial.valid).sum()) for trial in marked] == [20, 60, 0]
+
+
+def test_a_trial_that_is_active_throughout_is_compared_and_told() -> None:
+    (trial,) = disturbed_session(120)[0].trials[:1]
+    (marked,), lines = _applied([trial], [np.ones(len(trial), dtype=bool)], [])
+    assert marked.valid.all() and lines == [f"{trial.file}: muscles are active throughout; this is no passive recording"]
 
 
 def test_a_gap_is_completed_by_the_shape_of_all_repeats_at_the_level_of_each() -> None:

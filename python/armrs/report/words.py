@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 SYMBOLS_ON_PAGES = SYMBOLS.replace(", l the", ", ℓ the")
 """The same for pages, on which `tables.typeset` sets the names."""
 HISTORY_MEANING = (
-    "What was measured in each session; ± is one standard deviation. A change has the uncertainty of both sessions, from "
-    "the scatter of their own repeats. Differences between days that are no change of the joint, such as another strapping of the "
-    "arm, are not in this scatter. p is the probability of a difference at least as large without a change, corrected for the number of "
-    "parameters (Holm). A parameter counts as changed if p is below 5 %."
+    "What was measured in each session; ± is one standard deviation, without errors that are known to be the same in all sessions. A "
+    "change has the uncertainty of both sessions, from the scatter of their own repeats. Differences between days that are no change of "
+    "the joint, such as another strapping of the arm, are not in this scatter. p is the probability of a difference at least as large "
+    "without a change, corrected for the number of parameters (Holm). A parameter counts as changed if p is below 5 %."
 )
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: the torque of the contact force minus gravity and inertia, "
@@ -242,6 +242,7 @@ def followed(result: Mapping[str, Any]) -> None:
     """Print the history that a result was added to."""
     if "history" in result:
         show("Over the sessions, what the data decided in the last one", tables.history(result["history"]))
+        print(f"{HISTORY_MEANING}\n")
 
 
 def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:

@@ -8,7 +8,7 @@ import re
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -292,26 +292,38 @@ def _foreseen(file: Path, result: Followed, subject: str, date: str) -> History:
         if file.exists() and file.stat().st_size > 0:
             with closing(_open(file)) as connection:
                 connection.backup(memory)
-        _write(memory, result, subject, date)
-        return _courses(memory, result.method)
+        replaced = _write(memory, result, subject, date)
+        found = _courses(memory, result.method)
+        if not replaced:
+            return found
+        line = f"history: the former result of {show(result.dataset.name)} on {date} is replaced; another --date keeps both"
+        return replace(found, warnings=(*found.warnings, line))
 
 
-def _write(connection: sqlite3.Connection, result: Followed, subject: str, date: str) -> None:
-    """Add a result in one transaction, the tables included: a process that is killed leaves the history as it was."""
+def _write(connection: sqlite3.Connection, result: Followed, subject: str, date: str) -> bool:
+    """Add a result in one transaction, the tables included: a process that is killed leaves the history as it was.
+
+    Returns
+    -------
+    bool
+        Whether it took the place of a former one.
+    """
     # A script begins its own transaction; statements that follow it belong to the same one.
     connection.executescript(f"BEGIN IMMEDIATE; PRAGMA application_id = {APPLICATION}; {_SCHEMA} {_WHOSE}")
     connection.execute("INSERT INTO subject SELECT ? WHERE NOT EXISTS (SELECT * FROM subject)", (subject,))
-    _insert(connection, result, date)
+    replaced = _insert(connection, result, date)
     connection.commit()
+    return replaced
 
 
-def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> None:
+def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> bool:
     key = (result.dataset.name, date, result.method)
-    connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
+    former = connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
     made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints))
     estimates = {(e.name, e.kind, e.joint or 0): e for e in result.followed()}
     rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)]
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
+    return former.rowcount > 0
 
 
 def read(path: str | os.PathLike[str], method: str = "joint") -> History:
