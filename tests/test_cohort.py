@@ -13,6 +13,7 @@ from armrs import BadInput
 from armrs.analysis import mixed_model
 from armrs.cli import main
 from armrs.io import files
+from armrs.report import clinic_words
 
 SEED = 7101
 
@@ -63,21 +64,55 @@ def test_norm_bands_hold_and_no_difference_is_called_one(tmp_path: Path) -> None
 
 
 def test_groups_and_sides_that_differ_are_told(tmp_path: Path) -> None:
+    """Only patients have a side that differs: it widens neither the scatter of subjects nor the norm band of the others."""
     draw = np.random.default_rng(SEED)
     lines = ["subject,group,side,quantity,value"]
-    for group, mean in (("control", 1.0), ("patient", 1.6)):
+    for group, mean, right in (("control", 1.0, 0.0), ("patient", 1.6, 0.4)):
         for k in range(15):
             own = mean + 0.2 * draw.standard_normal()
             lines += [
                 f"{group}{k},{group},{side},half width,{own + more + 0.05 * draw.standard_normal()}"
-                for side, more in (("l", 0.0), ("r", 0.2))
+                for side, more in (("l", 0.0), ("r", right))
             ]
     (tmp_path / "t.csv").write_text("\n".join(lines))
     found = armrs.cohort(tmp_path / "t.csv")
-    differ = {c.between: c for c in found.contrasts}
-    assert differ["control", "patient"].p_value < 1e-4 and differ["control", "patient"].difference == pytest.approx(0.6, abs=0.2)
+    differ = {(*c.between, c.within): c for c in found.contrasts}
+    assert set(differ) == {("control", "patient", ""), ("l", "r", "control"), ("l", "r", "patient")}
+    groups = differ["control", "patient", ""]
+    assert groups.p_value < 1e-4 and groups.difference == pytest.approx(0.8, abs=0.2)
     # Within subjects the sides are told far better than their scatter between subjects would.
-    assert differ["l", "r"].difference == pytest.approx(0.2, abs=0.04) and differ["l", "r"].std < 0.02
+    sides = differ["l", "r", "patient"]
+    assert sides.difference == pytest.approx(0.4, abs=0.04) and sides.std < 0.03 and sides.p_value < 1e-4
+    assert differ["l", "r", "control"].p_value > 0.05
+    bands = {(q.group, q.side): q for q in found.quantities}
+    assert len(bands) == 4 and bands["control", "l"].within_std == pytest.approx(0.05, rel=0.3)
+    assert len(found.values_of(bands["patient", "r"])) == 15
+    said = clinic_words.verdict(found.to_dict() | {"verb": "cohort"})
+    assert "higher in patient than in control and higher in r than in l (group patient)" in said
+
+
+def test_differences_of_sides_within_subjects_have_the_p_value_of_a_paired_t_test(tmp_path: Path) -> None:
+    from scipy.stats import ttest_rel
+
+    draw = np.random.default_rng(SEED)
+    left = draw.standard_normal(12)
+    right = left + 0.1 + 0.3 * draw.standard_normal(12)
+    rows = [f"s{k},{side},stiffness,{v}" for side, of in (("l", left), ("r", right)) for k, v in enumerate(of)]
+    (tmp_path / "t.csv").write_text("\n".join(["subject,side,quantity,value", *rows]))
+    (found,) = armrs.cohort(tmp_path / "t.csv").contrasts
+    paired = ttest_rel(right, left)
+    assert found.difference == pytest.approx(float(np.mean(right - left)))
+    assert found.p_value == pytest.approx(float(paired.pvalue), rel=1e-3)
+
+
+def test_groups_that_were_measured_on_different_sides_are_compared_with_a_warning(tmp_path: Path) -> None:
+    rows = [f"{g}{k},{g},{side},stiffness,{1.0 + 0.1 * k + more}" for g, side, more in (("a", "l", 0.0), ("b", "r", 5.0)) for k in range(4)]
+    (tmp_path / "t.csv").write_text("\n".join(["subject,group,side,quantity,value", *rows]))
+    found = armrs.cohort(tmp_path / "t.csv")
+    (contrast,) = found.contrasts
+    assert contrast.between == ("a", "b") and contrast.difference == pytest.approx(5.0)
+    (line,) = found.warnings
+    assert line.endswith("a and b were measured on different sides: their difference may be one of sides")
 
 
 def test_the_verb_and_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

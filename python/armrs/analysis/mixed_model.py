@@ -24,6 +24,8 @@ class MixedModel:
     between, within : float
         Standard deviations between subjects and between sessions of one, in the unit of the values.
     subjects, samples : int
+    levels : int
+        Coefficients that means of subjects determine; the others are differences within subjects.
     """
 
     coefficients: np.ndarray
@@ -32,16 +34,17 @@ class MixedModel:
     within: float
     subjects: int
     samples: int
+    levels: int
 
     @property
     def between_freedom(self) -> float:
         """Degrees of freedom of what differs between subjects."""
-        return max(float(self.subjects - len(self.coefficients)), 1.0)
+        return max(float(self.subjects - self.levels), 1.0)
 
     @property
     def within_freedom(self) -> float:
         """Degrees of freedom of what differs between sessions of one subject; zero where each has one."""
-        return float(self.samples - self.subjects)
+        return max(float(self.samples - self.subjects - (len(self.coefficients) - self.levels)), 0.0)
 
     @property
     def total(self) -> float:
@@ -99,7 +102,8 @@ def fit(values: np.ndarray, design: np.ndarray, subjects: Sequence[object]) -> M
         found = minimize_scalar(lambda log: solved(float(np.exp(log)))[3], bounds=(-12.0, 12.0), method="bounded", options={"xatol": 1e-6})
         ratio = float(np.exp(found.x)) if found.fun < solved(0.0)[3] else 0.0
     coefficients, spread, variance, _ = solved(ratio)
-    if n == len(names):
-        # One session a subject: nothing tells between from within.
-        return MixedModel(coefficients, variance * spread, float(np.sqrt(variance)), 0.0, len(names), n)
-    return MixedModel(coefficients, variance * spread, float(np.sqrt(ratio * variance)), float(np.sqrt(variance)), len(names), n)
+    counted = len(names), n, int(np.linalg.matrix_rank(member.T @ design))
+    # With one session a subject nothing tells between from within.
+    between, within = (1.0, 0.0) if n == len(names) else (float(np.sqrt(ratio)), 1.0)
+    deviation = float(np.sqrt(variance))
+    return MixedModel(coefficients, variance * spread, between * deviation, within * deviation, *counted)

@@ -109,14 +109,14 @@ def _cohort(result: Cohort) -> Drawn:
             values = np.array(result.values_of(q))
             ax.plot(place + np.linspace(-0.22, 0.22, len(values)), values, "o", ms=3.5, color=plotting.BLUE)
             ax.hlines(q.mean, place - 0.34, place + 0.34, color=plotting.INK, lw=1.6)
-        ax.set_xticks(range(len(own)), [q.group for q in own])
+        ax.set_xticks(range(len(own)), ["\n".join(filter(None, (q.group, q.side))) for q in own])
         ax.set(title=name, ylabel=own[0].unit, xlim=(-0.6, len(own) - 0.4))
         ax.title.set_fontsize("small")
         ax.autoscale_view(scalex=False)
         ax.grid(visible=False, axis="x")
     for ax in axes[len(names) :]:
         ax.remove()
-    text = "One point a session; the line is the mean, the grey band holds 95 of 100 sessions of other subjects of the group."
+    text = "One point a session; the line is the mean, the grey band holds 95 of 100 sessions of other subjects of the group and side."
     return Drawn("cohort", "The cohort", text, figure)
 
 

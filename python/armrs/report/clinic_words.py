@@ -90,7 +90,8 @@ def _cohort(result: Mapping[str, Any]) -> str:
     higher: dict[str, list[str]] = {}
     for c in differ:
         first, second = c["between"]
-        higher.setdefault(_named(c), []).append(f"{'higher' if c['difference'] > 0.0 else 'lower'} in {second} than in {first}")
+        where = f" (group {c['within']})" if c["within"] else ""
+        higher.setdefault(_named(c), []).append(f"{'higher' if c['difference'] > 0.0 else 'lower'} in {second} than in {first}{where}")
     named = "; ".join(f"{name} is {' and '.join(ways)}" for name, ways in higher.items())
     named = named[:1].upper() + named[1:] or "No difference between groups or sides was detected"
     compared = f" {named} (level of 5 % for all comparisons together)." if result["contrasts"] else ""
@@ -103,6 +104,10 @@ def _named(item: Mapping[str, Any]) -> str:
     return str(item["name"]).replace("_", " ")
 
 
+def _with_unit(item: Mapping[str, Any]) -> str:
+    return f"{_named(item)} [{item['unit']}]" if item["unit"] else _named(item)
+
+
 def quantities(result: Mapping[str, Any]) -> Table:
     """Return mean, scatter between and within subjects, and the norm band of each quantity."""
     rows = []
@@ -110,41 +115,37 @@ def quantities(result: Mapping[str, Any]) -> Table:
         mean = tables.plus_minus(q["mean"], q["mean_std"])
         between, within = (tables.number(q[name], 0.1 * q[name] if q[name] else None) for name in ("between_std", "within_std"))
         known = [0.25 * (q[name][1] - q[name][0]) for name in ("norm_low_interval", "norm_high_interval")]
-        low, high = (tables.number(x, std) for x, std in zip(q["norm"], known, strict=True))
         ends = [
-            " … ".join(tables.number(x, std) for x in q[name])
-            for name, std in zip(("norm_low_interval", "norm_high_interval"), known, strict=True)
+            f"{tables.number(end, std)} ({' … '.join(tables.number(x, std) for x in q[name])})"
+            for end, name, std in zip(q["norm"], ("norm_low_interval", "norm_high_interval"), known, strict=True)
         ]
-        rows.append([_named(q), q["group"], q["unit"], q["subjects"], mean, between, within, f"{low} … {high}", *ends])
+        group = ", ".join(filter(None, (q["group"], q["side"])))
+        rows.append([_with_unit(q), group, q["subjects"], mean, f"{between}, {within}", *ends])
     head = [
         "quantity",
         "group",
-        "unit",
         "n",
         "mean ± standard error",
-        "std between",
-        "std within",
-        "norm band",
-        "its lower end lies in",
-        "its upper end lies in",
+        "std between, within",
+        "norm band from (95 % interval)",
+        "to (95 % interval)",
     ]
-    return Table(head, rows, left=3)
+    return Table(head, rows, left=2)
 
 
 def contrasts(result: Mapping[str, Any]) -> Table:
     """Return the differences between groups and between sides."""
     rows = [
         [
-            _named(c),
-            f"{c['between'][1]} − {c['between'][0]}",
-            c["unit"],
+            _with_unit(c),
+            f"{c['between'][1]} − {c['between'][0]}{', ' * bool(c['within'])}{c['within']}",
             tables.plus_minus(c["difference"], c["std"]),
             " … ".join(tables.number(x, c["std"]) for x in c["interval"]),
             f"{c['p_value']:.2g}",
         ]
         for c in result["contrasts"]
     ]
-    return Table(["quantity", "difference", "unit", "estimate ± standard error", "95 % interval", "p (Holm)"], rows, left=3)
+    return Table(["quantity", "difference", "estimate ± standard error", "95 % interval", "p (Holm)"], rows, left=2)
 
 
 def show_cohort(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -59,23 +59,26 @@ class Value:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of one group.
+    """A quantity of one group, where both sides were measured of one side.
 
     Attributes
     ----------
-    name, group, unit : str
+    name, group, side, unit : str
+        No side where only one was measured, or not all values have one.
     subjects, sessions : int
     mean, mean_std : float
     between_std, within_std : float
-        Between subjects, and between sessions and sides of one, of all groups together.
+        Between subjects, and between sessions of one, of all groups together; a difference of sides differs between subjects as
+        sessions do.
     norm : (float, float)
-        Holds 95 of 100 sessions of other subjects of the group.
+        Holds 95 of 100 sessions of other subjects of the group, on that side.
     norm_low_interval, norm_high_interval : (float, float)
         95 % intervals of the ends of the band that holds the middle 95 % of the group.
     """
 
     name: str
     group: str
+    side: str
     unit: str
     subjects: int
     sessions: int
@@ -96,6 +99,8 @@ class Contrast:
     ----------
     name, unit : str
     between : (str, str)
+    within : str
+        The group in which two sides are compared; empty without groups, and for groups, which are compared over their sides.
     difference, std : float
     interval : (float, float)
     p_value : float
@@ -105,6 +110,7 @@ class Contrast:
     name: str
     unit: str
     between: tuple[str, str]
+    within: str
     difference: float
     std: float
     interval: tuple[float, float]
@@ -138,7 +144,8 @@ class Cohort(Tabular):
 
     def values_of(self, quantity: Quantity) -> list[float]:
         """Return the values behind a quantity of one group."""
-        return [v.value for v in self.values if (v.quantity, v.group or ALL) == (quantity.name, quantity.group)]
+        own = (v for v in self.values if (v.quantity, v.group or ALL) == (quantity.name, quantity.group))
+        return [v.value for v in own if quantity.side in ("", v.side)]
 
     def tidy(self) -> Tidy:
         """Return the values, one a row."""
@@ -236,28 +243,46 @@ def _summary(values: Sequence[Value]) -> tuple[list[Quantity], list[Contrast], l
     groups = [g for g in counts if g not in few]
     if not groups:
         return [], [], warnings
-    sides = sorted({v.side for v in kept})
-    both = len(sides) == 2 and "" not in sides
-    design = np.array(
-        [[float((v.group or ALL) == g) for g in groups] + ([0.5 if v.side == sides[1] else -0.5] if both else []) for v in kept]
-    )
-    if np.linalg.matrix_rank(design) < design.shape[1]:
-        both, design = False, design[:, : len(groups)]
-        warnings.append(f"{name}: sides are not compared, as each group has one")
+    cells = _cells(kept, groups)
+    kept = [v for own in cells.values() for v in own]
+    design = np.repeat(np.eye(len(cells)), [len(own) for own in cells.values()], axis=0)
     fitted = mixed_model.fit(np.array([v.value for v in kept]), design, [v.subject for v in kept])
-    quantities = [_quantity(fitted, k, (name, g, unit), [v for v in kept if (v.group or ALL) == g]) for k, g in enumerate(groups)]
+    quantities = [_quantity(fitted, k, (name, *cell, unit), own) for k, (cell, own) in enumerate(cells.items())]
     contrasts = []
-    for k, group in enumerate(groups[1:], start=1):
-        vector = np.zeros(design.shape[1])
-        vector[0], vector[k] = -1.0, 1.0
-        contrasts.append(_contrast(fitted, vector, (name, unit), (groups[0], group), fitted.between_freedom))
-    if both:
-        freedom = max(fitted.within_freedom - 1.0, 1.0)
-        contrasts.append(_contrast(fitted, np.eye(design.shape[1])[-1], (name, unit), (sides[0], sides[1]), freedom))
+    for group in groups[1:]:
+        common = {side for g, side in cells if g == groups[0]} & {side for g, side in cells if g == group}
+        if not common:
+            warnings.append(f"{name}: {groups[0]} and {group} were measured on different sides: their difference may be one of sides")
+        means = [_mean_of(cells, g, common) for g in (groups[0], group)]
+        contrasts.append(_contrast(fitted, means[1] - means[0], (name, unit), ((groups[0], group), ""), fitted.between_freedom))
+    for group in groups:
+        sides = [side for g, side in cells if g == group]
+        if len(sides) == 2:
+            vector = _mean_of(cells, group, {sides[1]}) - _mean_of(cells, group, {sides[0]})
+            subjects = [{v.subject for v in cells[group, side]} for side in sides]
+            freedom = fitted.within_freedom if subjects[0] & subjects[1] else fitted.between_freedom
+            contrasts.append(
+                _contrast(fitted, vector, (name, unit), ((sides[0], sides[1]), "" if group == ALL else group), max(freedom, 1.0))
+            )
     return quantities, contrasts, warnings
 
 
-def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str], own: Sequence[Value]) -> Quantity:
+def _cells(values: Sequence[Value], groups: Sequence[str]) -> dict[tuple[str, str], list[Value]]:
+    """Return the values by group and side; without side where not two of them are known of all values."""
+    sides = sorted({v.side for v in values})
+    if len(sides) != 2 or "" in sides:
+        return {(g, ""): [v for v in values if (v.group or ALL) == g] for g in groups}
+    cells = {(g, side): [v for v in values if (v.group or ALL, v.side) == (g, side)] for g in groups for side in sides}
+    return {cell: own for cell, own in cells.items() if own}
+
+
+def _mean_of(cells: Iterable[tuple[str, str]], group: str, sides: Set[str]) -> np.ndarray:
+    """Return the shares of the cells in the mean of a group over some sides, or over all that it has if none is given, shape (n_cells,)."""
+    chosen = np.array([float(g == group and (not sides or side in sides)) for g, side in cells])
+    return chosen / chosen.sum()
+
+
+def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str, str], own: Sequence[Value]) -> Quantity:
     from scipy.stats import norm
 
     mean, variance = float(fitted.coefficients[place]), float(fitted.covariance[place, place])
@@ -279,12 +304,14 @@ def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str], own: 
     )
 
 
-def _contrast(fitted: MixedModel, vector: np.ndarray, named: tuple[str, str], between: tuple[str, str], freedom: float) -> Contrast:
+def _contrast(
+    fitted: MixedModel, vector: np.ndarray, named: tuple[str, str], compared: tuple[tuple[str, str], str], freedom: float
+) -> Contrast:
     difference = float(vector @ fitted.coefficients)
     std = max(float(np.sqrt(vector @ fitted.covariance @ vector)), 1e-300)
     half = students_t.quantile(LEVEL, freedom) * std
     p_value = students_t.chance(difference, std, freedom)
-    return Contrast(*named, between, difference, std, (difference - half, difference + half), p_value)
+    return Contrast(*named, *compared, difference, std, (difference - half, difference + half), p_value)
 
 
 def _rows(path: Path, needed: Sequence[str], may: Sequence[str]) -> list[tuple[int, Mapping[str, str]]]:
