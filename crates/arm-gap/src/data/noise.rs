@@ -362,6 +362,29 @@ fn inverse_factor(correlation: &[f64], n: usize) -> Vec<f64> {
     inverse
 }
 
+/// Columns made orthogonal to each other, one after the other; those that add nothing are left out.
+pub fn orthogonal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut column in columns {
+        let before = dot(&column, &column);
+        project_off(&mut column, &basis);
+        if dot(&column, &column) > 1e-9 * before {
+            basis.push(column);
+        }
+    }
+    basis
+}
+
+/// Takes the least-squares share of orthogonal columns out of rows.
+pub fn project_off(rows: &mut [f64], basis: &[Vec<f64>]) {
+    for column in basis {
+        let share = dot(rows, column) / dot(column, column);
+        for (v, c) in rows.iter_mut().zip(column) {
+            *v -= share * c;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use rand_chacha::ChaCha8Rng;

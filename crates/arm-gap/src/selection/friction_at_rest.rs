@@ -96,7 +96,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// What is found when no sample is left out because a joint rests there.
-    fn over_whole_trials<R>(&mut self, find: impl FnOnce(&Self) -> R) -> R {
+    pub(crate) fn over_whole_trials<R>(&mut self, find: impl FnOnce(&Self) -> R) -> R {
         let resting = std::mem::take(&mut self.resting);
         self.cut();
         let found = find(self);

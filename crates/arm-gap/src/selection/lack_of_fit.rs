@@ -1,6 +1,6 @@
 //! What a fitted hypothesis leaves: more than repeats differ among themselves?
 
-use crate::data::noise::dot;
+use crate::data::noise::{orthogonal, project_off};
 use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -108,29 +108,6 @@ pub fn lack_of_fit<const N: usize>(
         ratio,
         z: (ratio - 1.0) / libm::sqrt(variance),
         excess: common / noise - common_dof,
-    }
-}
-
-/// Columns made orthogonal to each other, one after the other; those that add nothing are left out.
-pub fn orthogonal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    for mut column in columns {
-        let before = dot(&column, &column);
-        project_off(&mut column, &basis);
-        if dot(&column, &column) > 1e-9 * before {
-            basis.push(column);
-        }
-    }
-    basis
-}
-
-/// Takes the least-squares share of orthogonal columns out of rows.
-pub fn project_off(rows: &mut [f64], basis: &[Vec<f64>]) {
-    for column in basis {
-        let share = dot(rows, column) / dot(column, column);
-        for (v, c) in rows.iter_mut().zip(column) {
-            *v -= share * c;
-        }
     }
 }
 

@@ -168,7 +168,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(state)
     }
 
-    /// Leaves out of single trials what disturbs them, the clearest first.
+    /// Leaves out of single trials what disturbs them, the clearest first. Whole trials tell: what disturbs one while a joint with dry
+    /// friction rests, repeats differ by there.
     fn disturbances(
         &mut self,
         (mut fitted, mut point): Settled<'a, N>,
@@ -176,7 +177,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ) -> Result<Settled<'a, N>, GapError> {
         let most = trial_specific.len() + DISTURBANCES;
         while trial_specific.len() < most
-            && let Some(one) = self.disturbance(&point, 1.0)
+            && let Some(one) = self.over_whole_trials(|whole| whole.disturbance(&point, 1.0))
             && let Some(trial) = one.trial
         {
             self.leave_out(trial, one.span());

@@ -3,11 +3,10 @@
 use arm_core::effect::{Effect, Nature};
 
 use crate::candidates::candidate::price;
-use crate::data::noise::dot;
+use crate::data::noise::{dot, orthogonal, project_off};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
-use crate::selection::lack_of_fit::{orthogonal, project_off};
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{TrialSpecific, timing_of};
@@ -103,10 +102,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         };
         let asked: Vec<Asked> = shapes.iter().filter_map(see).collect();
         let mut clearest: Vec<(f64, &Asked)> = Vec::new();
-        let held = held_either_way(&point.hypothesis.effects());
-        let possible = asked
-            .iter()
-            .filter(|one| self.is_finding(one, suspect, held));
+        let possible = asked.iter().filter(|one| self.is_possible(one, suspect));
         for one in possible {
             let gain = one.gain(&suspect.deviation) / scale;
             let same = |(_, c): &&mut (f64, &Asked)| c.place() == one.place();
@@ -132,31 +128,48 @@ impl<const N: usize> PreparedSession<'_, N> {
             let left: Vec<_> = deviations.iter().map(|d| first.asked.left_of(d)).collect();
             Some(scatter_elsewhere(on_grid, &asked, &left))
         });
+        // What is none competes all the same: where it explains most, the others only stand for it.
+        let effects = point.hypothesis.effects();
+        let is_finding = |one: &Explained| self.is_finding(&one.asked, suspect, &effects);
+        if !explained.first().is_some_and(is_finding) {
+            explained.clear();
+        }
+        explained.retain(is_finding);
         (explained, scale * scatter.unwrap_or(1.0))
     }
 
-    /// Whether what is asked is a finding in a trial, whatever its size: of two repeats both deviate alike, and the disturbed one is further
-    /// from the model; what moves within what the calibration promises of it is none.
-    ///
-    /// * `held` - see [`held_either_way`]
-    fn is_finding(&self, one: &Asked, suspect: &Compared, held: f64) -> bool {
-        let own = dot(&one.row, &suspect.own).abs();
-        let further = |other: &Vec<f64>| own > dot(&one.row, other).abs();
-        let prior = one.effect.kind.prior();
-        let promised = match (prior.nature, prior.promise) {
-            (Nature::Slip, _) => self.session.tolerance.handle_placement,
-            (Nature::Burst, _) => held,
-            (_, Some(_)) => self.session.tolerance.angle_offset(),
-            (_, None) => 0.0,
+    /// Whether what is asked can have happened in a trial: it deviates from all repeats by more than any of them does. Of two both deviate
+    /// alike, and the disturbed one is further from the model. And what hardly shows in the samples that are left, or in a joint that sticks, would have to be larger than anything.
+    fn is_possible(&self, one: &Asked, suspect: &Compared) -> bool {
+        let own = dot(&one.row, &suspect.own);
+        let others: Vec<f64> = suspect.others.iter().map(|o| dot(&one.row, o)).collect();
+        let centre = match others.len() {
+            1 => 0.0,
+            n => (own + others.iter().sum::<f64>()) / (n + 1) as f64,
         };
-        let size = one.size(&suspect.deviation).abs();
-        // What hardly shows in the samples that are left, or in a joint that sticks, would have to be larger than anything.
+        let mut others = others.iter();
+        let is_furthest = others.all(|other| (own - centre).abs() > (other - centre).abs());
         let largest = one.effect.kind.info().parameters[one.sizes[0]].max;
-        let largest = match prior.nature {
+        let largest = match one.effect.kind.prior().nature {
             Nature::Burst => strongest(self.session.weight_moment(one.effect.index)).min(largest),
             _ => largest,
         };
-        size > promised && size < largest && suspect.others.iter().all(further)
+        is_furthest && one.size(&suspect.deviation).abs() < largest
+    }
+
+    /// Whether what is asked is a finding in a trial: what moves within what the calibration promises of it is none, nor what dry friction
+    /// may hold.
+    ///
+    /// * `effects` - of the model that is compared
+    fn is_finding(&self, one: &Asked, suspect: &Compared, effects: &[Effect<f64>]) -> bool {
+        let prior = one.effect.kind.prior();
+        let promised = match (prior.nature, prior.promise) {
+            (Nature::Slip, _) => self.session.tolerance.handle_placement,
+            (Nature::Burst, _) => held_either_way(effects, one.effect.index),
+            (_, Some(_)) => self.session.tolerance.angle_offset(),
+            (_, None) => 0.0,
+        };
+        one.size(&suspect.deviation).abs() > promised
     }
 
     /// A fitted trial beside its repeats; `None` where it has none.
@@ -262,12 +275,12 @@ impl Compared {
 }
 
 /// Torque by which two repeats may differ where a joint sticks \[N m\]: it holds any torque within plus and minus its dry friction. A burst
-/// below is none. Of the joint that has most.
-fn held_either_way(effects: &[Effect<f64>]) -> f64 {
+/// below is none.
+fn held_either_way(effects: &[Effect<f64>], joint: usize) -> f64 {
     let is_torque = |e: &&Effect<f64>| e.kind.info().parameters[0].unit == "N m";
     let dry = effects
         .iter()
-        .filter(|e| e.on && e.kind.smoothed_by().is_some());
+        .filter(|e| e.on && e.index == joint && e.kind.smoothed_by().is_some());
     2.0 * dry
         .filter(is_torque)
         .fold(0.0, |most, e| f64::max(most, e.parameters[0]))
@@ -278,7 +291,8 @@ fn held_either_way(effects: &[Effect<f64>]) -> f64 {
 pub(crate) fn is_held(one: &TrialSpecific, effects: &[Effect<f64>]) -> bool {
     let is_burst = one.effect.kind.prior().nature == Nature::Burst;
     let uncertain = one.sd.first().map_or(0.0, |sd| 2.0 * sd);
-    is_burst && one.effect.parameters[0].abs() <= held_either_way(effects) + uncertain
+    is_burst
+        && one.effect.parameters[0].abs() <= held_either_way(effects, one.effect.index) + uncertain
 }
 
 /// What muscles can do in a joint at most \[N m\]; anything where nothing weighs.
@@ -340,16 +354,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_friction_of_the_driest_joint_counts_and_what_is_no_torque_does_not() {
+    fn the_driest_law_of_a_joint_counts_and_what_is_no_torque_does_not() {
         let of = |kind, index, size: f64| Effect::<f64>::new(kind, index).with(&[size]);
         let effects = [
             of(Kind::Viscous, 0, 3.0),
             of(Kind::Coulomb, 0, 0.1),
             of(Kind::Coulomb, 1, 0.2),
+            of(Kind::Stribeck, 1, 0.15),
             of(Kind::LoadFriction, 1, 0.9),
         ];
-        assert_eq!(held_either_way(&effects), 0.4);
-        assert_eq!(held_either_way(&effects[..1]), 0.0);
+        assert_eq!(
+            [0, 1, 2].map(|j| held_either_way(&effects, j)),
+            [0.2, 0.4, 0.0]
+        );
     }
 
     #[test]
@@ -370,8 +387,10 @@ mod tests {
             columns: Vec::new(),
             sizes: Vec::new(),
         };
-        let dry = [Effect::<f64>::new(Kind::Coulomb, 1).with(&[0.2])];
+        let dry = [Effect::<f64>::new(Kind::Coulomb, 0).with(&[0.2])];
         assert!(is_held(&of("voluntary", -0.41), &dry) && !is_held(&of("voluntary", 0.43), &dry));
+        let elsewhere = [Effect::<f64>::new(Kind::Coulomb, 1).with(&[0.2])];
+        assert!(!is_held(&of("voluntary", -0.41), &elsewhere));
         assert!(
             !is_held(&of("handle_slip", 0.01), &dry),
             "a slip is no torque"
