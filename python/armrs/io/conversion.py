@@ -52,6 +52,12 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     -----
     Numbers are float64, or int64 where float64 would not hold them. A missing sample is an empty cell in CSV and null in Parquet; NaN in
     Parquet counts as missing too.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> armrs.convert("session", "parquet", to="parquet")[0].name
+    'slow_1.parquet'
     """
     suffix = "." + checks.choice("to", to, tuple(s[1:] for s in SUFFIXES))
     path = checks.path("source", source)

@@ -25,6 +25,14 @@ _FORMATS = tuple(suffix[1:] for suffix in (*SUFFIXES, *MOTION_SUFFIXES))
 def read_markers(path: str | os.PathLike[str]) -> Markers:
     """Read marker trajectories from a C3D or TRC file; positions in metres, NaN where a marker was not seen.
 
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Markers
+
     Raises
     ------
     BadInput

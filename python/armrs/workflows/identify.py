@@ -258,12 +258,23 @@ def identify(
     level : float
         Probability of the intervals.
 
+    Returns
+    -------
+    Identified
+
     Raises
     ------
     BadInput
         For an unknown effect or method, and data that cannot be used.
     IdentificationError
         When no solution exists.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> result = armrs.identify("demo/data", with_effects=["coulomb"])  # doctest: +SKIP
+    >>> print(result.combinations[0])  # doctest: +SKIP
+    m1*l1 + a1*m2 = 0.7033 ± 0.0088 kg m
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     kinds = _checked(dataset, method, with_effects, cutoff, motion, level)

@@ -329,6 +329,10 @@ def simulate(
     sensors, seeds
         What sensors read of the run, once for every seed.
 
+    Returns
+    -------
+    Simulated
+
     Raises
     ------
     BadInput

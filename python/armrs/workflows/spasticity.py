@@ -194,6 +194,10 @@ def spasticity(
     progress : callable, optional
         Called with the name of the stage and the share that is done, 0 to 1.
 
+    Returns
+    -------
+    Spasticity
+
     Raises
     ------
     BadInput

@@ -57,6 +57,12 @@ def find_gap(
     -----
     Where the simulated arm does not follow the measured one at all, as a free wrist may, joint torques in measured motion are compared
     instead; the first of the warnings says so.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> armrs.find_gap("session").verdict  # doctest: +SKIP
+    'explained'
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     dataset = dataset.replace(trials=comparable(dataset.trials))
