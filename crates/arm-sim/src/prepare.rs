@@ -45,7 +45,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
         in_pieces: bool,
     ) -> Result<Self, SimulationError> {
         let schedule = Schedule::of(experiment)?;
-        told(&experiment.effects, experiment.activity.is_some())?;
+        refuse_unknown_activity(&experiment.effects, experiment.activity.is_some())?;
         let setup = experiment.altered()?;
         let mut model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
         model.heaves |= experiment.base.is_some();
@@ -192,7 +192,10 @@ fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input
 }
 
 /// Refuses effects that depend on muscle activity where nothing tells it.
-pub(crate) fn told(effects: &[Effect<f64>], activity: bool) -> Result<(), SimulationError> {
+pub(crate) fn refuse_unknown_activity(
+    effects: &[Effect<f64>],
+    activity: bool,
+) -> Result<(), SimulationError> {
     let deaf = |e: &&Effect<f64>| e.on && e.kind.feels_activity() && !activity;
     match effects.iter().find(deaf) {
         Some(effect) => Err(SimulationError::NoActivity {

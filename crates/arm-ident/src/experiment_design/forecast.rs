@@ -13,7 +13,7 @@ use crate::inference::summary::base_name;
 use crate::regression::instrument::Instrument;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
-use crate::regression::preprocessing::{Pieces, apart, filtered};
+use crate::regression::preprocessing::{Pieces, filtered, with_rest_columns};
 use crate::regression::sensitivity::{Course, parts};
 use crate::regression::trial::{Model, Tolerance, Trial};
 use crate::regression::unknown::{Source, Unknown, unknowns};
@@ -164,7 +164,7 @@ pub(crate) fn said<const N: usize>(
             let mut rows = Instrument::new((model, &unknowns), trial, (course, &motion), 0.0);
             let (cutoff, width) = (question.accuracy.cutoff, rows.building.width());
             let pieces = filtered(trial, cutoff, width, |count| rows.next(count))?;
-            Ok(apart(pieces, unknowns.len()))
+            Ok(with_rest_columns(pieces, unknowns.len()))
         })
         .collect::<Result<Vec<Pieces>, IdentError>>()?;
     let torque_noise: Vec<Vec<Covariance<N>>> = seen
