@@ -16,6 +16,7 @@ from .dataset import FILE, describe, described_model, name_of, output_names
 from .samples import NUMBER, SUFFIXES, csv_place, explain_csv, header_of, parquet_table, write_table
 
 _EXACT = 2.0**53
+"""Below it a float holds every whole number."""
 
 
 @dataclass(frozen=True)
