@@ -304,7 +304,7 @@ def _with_muscles(dataset: Dataset, effects: list[Effect], fitted: list[bool]) -
         if not recorded or (effect in dataset.model.all_effects and effect.joint not in recorded):
             found, allowed = (
                 Text(f"no muscle of joint {effect.joint}"),
-                f"an emg column that tells its activity: {effect.kind} depends on it",
+                f"an emg column with its activity: {effect.kind} depends on it",
             )
             raise BadInput("[[muscle]]", found, allowed, file=None if dataset.folder is None else dataset.folder / FILE)
     kept = [k for k, (effect, felt) in enumerate(zip(effects, feel, strict=True)) if not felt or effect.joint in recorded]
@@ -378,7 +378,7 @@ def _identified(built: _armrs.Rig, settings: CoreSettings, dataset: Dataset) -> 
     if not hand_meets_handle(dataset):
         raise IdentificationError(error)
     why = error.split(":")[0] if "differs from" in error else "the arm cannot be simulated"
-    return found, (f"speeds and accelerations are measured, not simulated: with what measured motion tells {why}",)
+    return found, (f"speeds and accelerations are measured, not simulated: {why}, also with the values that fit the measured motion",)
 
 
 _INERTIA_FELT = 1.0

@@ -105,5 +105,5 @@ def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progres
 def _torques_instead(error: SimulationError) -> str:
     return (
         f"The simulated arm does not follow the measured one ({error}): joint torques in measured motion are compared instead of angles "
-        "and forces. Effects of the contact and of the robot cannot be asked that way."
+        "and forces. Effects of the contact and of the robot are not tested then."
     )
