@@ -19,8 +19,8 @@ pub enum SimulationError {
         /// The values allowed, in words.
         allowed: &'static str,
     },
-    /// An effect that depends on muscle activity, of which nothing is told.
-    #[error("{kind} depends on muscle activity, of which nothing is told")]
+    /// An effect that depends on muscle activity, where none is given.
+    #[error("{kind} depends on muscle activity, and none is given")]
     NoActivity {
         /// Kind of the effect.
         kind: &'static str,
