@@ -1,4 +1,4 @@
-"""Examples of docstrings run and print what they say."""
+"""Examples of docstrings and of crates run and print what they say."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from armrs import _armrs
 from conftest import Session
 
 PACKAGE = Path(armrs.__file__).parent
+CRATES = Path(__file__).parents[1] / "crates"
 WITH_EXAMPLES = [
     ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
     for path in sorted(PACKAGE.rglob("*.py"))
@@ -48,3 +49,16 @@ def test_the_examples_of_the_core_run() -> None:
     ]
     assert len(tests) >= 10
     assert failed(tests) == ""
+
+
+def test_every_crate_has_a_readme_whose_example_runs() -> None:
+    """As a test of its documentation; that of the bindings is Python, and the program for digests shows commands."""
+    crates = {path.parent.name: path.parent for path in CRATES.glob("*/Cargo.toml")}
+    readmes = {name: (crate / "README.md").read_text(encoding="utf-8") for name, crate in crates.items()}
+    assert len(readmes) >= 12 and all("```" in text for text in readmes.values())
+    sources = {path.parts[-3]: path.read_text(encoding="utf-8") for path in CRATES.glob("*/src/lib.rs")}
+    run = {name for name, source in sources.items() if 'include_str!("../README.md")' in source}
+    assert {*crates} - run == {"arm-py", "crosscheck"}
+    shown = "".join(line for line in readmes["arm-py"].splitlines(keepends=True) if not line.startswith("```"))
+    test = doctest.DocTestParser().get_doctest(shown, {}, "README.md", None, None)
+    assert test.examples and failed([test]) == ""
