@@ -3,7 +3,7 @@ use arm_core::effect::{Kind, Parameters};
 use crate::fields::{Bounds, Fields};
 use crate::number::shortened;
 use crate::value::by_value;
-use crate::{Joint, Refused, Table, Value, kind, kinds, unknown};
+use crate::{Refused, Table, Value, kind, kinds, unknown};
 
 /// A channel of the force sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -204,9 +204,9 @@ impl Effect {
         Self::from_value_on(&[], place, value)
     }
 
-    /// Reads a table `[[effect]]` of an arm, which may give the number of a joint or its name.
+    /// Reads a table `[[effect]]` of an arm with joints of these names, which may give the number of a joint or its name.
     pub(crate) fn from_value_on(
-        joints: &[Joint],
+        joints: &[&str],
         place: &str,
         value: Value,
     ) -> Result<Self, Refused> {
@@ -303,22 +303,19 @@ fn index(number: i64) -> usize {
 }
 
 /// The number of a joint that is called by its name; any other value as it is, and a name where there are no joints.
-fn numbered(value: Value, joints: &[Joint]) -> Result<Value, Refused> {
+fn numbered(value: Value, joints: &[&str]) -> Result<Value, Refused> {
     let name = match &value {
         Value::Text(name) if !joints.is_empty() => name,
         _ => return Ok(value),
     };
-    let mut called = (1_i64..).zip(joints).filter(|(_, j)| j.name == *name);
+    let mut called = (1_i64..).zip(joints).filter(|(_, joint)| *joint == name);
     match (called.next(), called.next()) {
         (Some((number, _)), None) => Ok(Value::Integer(number)),
         (Some(_), Some(_)) => {
             let allowed = "the number of the joint: several have this name";
             Err(Refused::new("joint", value.shown(), allowed))
         }
-        (None, _) => {
-            let names: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
-            Err(unknown("joint", name, "joint", &names))
-        }
+        (None, _) => Err(unknown("joint", name, "joint", joints)),
     }
 }
 

@@ -271,7 +271,6 @@ def identify(
 
     Examples
     --------
-    >>> import armrs
     >>> result = armrs.identify("demo/data", with_effects=["coulomb"])  # doctest: +SKIP
     >>> print(result.combinations[0])  # doctest: +SKIP
     m1*l1 + a1*m2 = 0.7033 ± 0.0088 kg m

@@ -15,10 +15,10 @@ from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
 from ..tabular import Framed, Tidy
-from ..workflows.driven import CoreRun, driven
-from ..workflows.movement import Movement
-from ..workflows.simulate import DEFAULT_RATE
-from ..workflows.stiction import DEFAULT_DT
+from .driven import CoreRun, driven
+from .movement import Movement
+from .simulate import DEFAULT_RATE
+from .stiction import DEFAULT_DT
 
 
 @dataclass(frozen=True, eq=False)
