@@ -16,7 +16,7 @@ pub const UNKNOWNS: usize = 18;
 /// The equation of motion as the C interface holds it.
 pub type DeviceEquation<T, const N: usize> = Equation<T, N, UNKNOWNS, EFFECTS>;
 
-/// What a device is told of a model.
+/// What a device needs of a model.
 ///
 /// Parameters
 /// ----------

@@ -90,7 +90,7 @@ pub enum SimulationError {
         damping: f64,
         /// Largest stable step \[s\].
         largest: f64,
-        /// The step asked for \[s\].
+        /// Requested step \[s\].
         dt: f64,
     },
     /// The state ceased to be finite.
@@ -121,7 +121,7 @@ pub enum SimulationError {
         "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {asked:e} rad; steps shorter than 1e-6 s are not tried"
     )]
     Accuracy {
-        /// Accuracy asked for \[rad\].
+        /// Requested accuracy \[rad\].
         asked: f64,
         /// Estimated error at the shortest step \[rad\].
         reached: f64,

@@ -175,7 +175,7 @@ pub(crate) fn commands<const N: usize>(
     with_measured(experiment, &mut out[from..]);
 }
 
-/// Moves the base along its measured path, and tells the activity of muscles, where there is one.
+/// Moves the base along its measured path, and sets the activity of muscles, where there is one.
 #[inline]
 fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input<f64, N>]) {
     if let Some(path) = &experiment.base {
@@ -191,7 +191,7 @@ fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input
     }
 }
 
-/// Refuses effects that depend on muscle activity where nothing tells it.
+/// Refuses effects that depend on muscle activity where none is given.
 pub(crate) fn refuse_unknown_activity(
     effects: &[Effect<f64>],
     activity: bool,

@@ -141,7 +141,7 @@ const LONGEST_GAP: f64 = 0.02;
 const SETTLING: f64 = 1.5;
 /// Rows in a period of the low-pass' cutoff. What it lets through changes so slowly that more would say the same again.
 const ROWS_PER_PERIOD: f64 = 20.0;
-/// Largest change in a period that is told from an infinite one.
+/// Largest change in a period that can be distinguished from an infinite one.
 const LARGEST: f64 = f32::MAX as f64;
 /// Share of its samples that a window needs.
 const LEAST_SHARE: f64 = 0.5;

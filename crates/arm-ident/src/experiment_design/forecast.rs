@@ -66,7 +66,7 @@ pub struct Task<const N: usize> {
 /// What is asked of the data.
 #[derive(Clone, Debug)]
 pub struct Question<const N: usize> {
-    /// The arm as it is believed to be, with the effects that are to be fitted at guessed values.
+    /// The assumed arm, with the effects that are to be fitted at guessed values.
     pub model: Model<N>,
     /// The robot that has to reach the path.
     pub robot: Option<Robot<f64>>,
@@ -85,7 +85,7 @@ pub struct Predicted {
     pub unit: &'static str,
     /// Index of the fitted effect, for its parameters.
     pub effect: Option<usize>,
-    /// Value believed.
+    /// Assumed value.
     pub value: f64,
     /// Standard deviation to be expected, with what is known beforehand.
     pub std: f64,

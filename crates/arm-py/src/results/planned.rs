@@ -15,7 +15,7 @@ result_class! {
         kind: String, "";
         /// Joint, from 1.
         joint: Option<usize>, "";
-        /// As it is believed before the experiment, in `unit`.
+        /// Value assumed before the experiment, in `unit`.
         value: f64, "";
         /// Standard deviation to be expected, with what is known beforehand, in `unit`.
         std: f64, "";
