@@ -253,8 +253,8 @@ def identify(
     cutoff : float, optional
         Cutoff of the common low-pass [Hz]; chosen from the data when absent.
     motion : {"auto", "measured", "simulated"}
-        Where the speeds and accelerations come from. "auto": simulated along the robot's path where it is known, with what measured
-        motion tells of the arm where the model as given moves elsewhere; measured, which is said in `warnings`, where that does too.
+        Where the speeds and accelerations come from. "auto": simulated along the robot's path where it is known. If the model as given
+        does not follow it, with the values that fit the measured motion; if these do not either, measured, with a line in `warnings`.
     level : float
         Probability of the intervals.
 

@@ -225,7 +225,7 @@ def forecast(
     Parameters
     ----------
     model : Model
-        The arm as it is believed to be.
+        The assumed arm.
     movements : sequence of Movement
     repeats : int
         Trials of each movement.
@@ -296,7 +296,7 @@ def plan(
     Parameters
     ----------
     model : Model
-        The arm as it is believed to be. Its robot, where there is one, has to reach every place of the path.
+        The assumed arm. Its robot, where there is one, has to reach every place of the path.
     limits : Limits
         Of joints, speed, acceleration, the robot, force and duration.
     speeds : sequence of float

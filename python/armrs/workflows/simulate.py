@@ -157,7 +157,7 @@ class Simulated(Doubted, Tabular, Series):
     columns : dict of str to ndarray
         Everything that was recorded: tip, handle, robot angles, every torque by itself, energies and works.
     readings : tuple of Readings
-        What the sensors read, one for each seed asked for.
+        What the sensors read, one for each seed.
     model : Model
     settings : dict
         Engine, integrator (of the native engine), step and rate that made it.
