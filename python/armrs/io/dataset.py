@@ -374,6 +374,11 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     Path
         The `dataset.toml` written. Everything is written or nothing.
 
+    Raises
+    ------
+    BadInput
+        For a format that is none of these, and a folder that is a file.
+
     Notes
     -----
     Samples that were missing are written as empty cells, not as measured.
