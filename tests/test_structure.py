@@ -112,6 +112,26 @@ def test_the_path_of_find_gap_does_not_go_back_and_forth() -> None:
     assert max(structure.returns(rooms).values()) + len(asked) <= 5
 
 
+def test_a_parameter_has_three_forms_on_its_way_to_a_report() -> None:
+    """Those that the architecture lists, and they exist."""
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    forms = re.findall(r"^\d\. (.+)", page.partition("## The forms of a parameter")[2].partition("\n## ")[0], flags=re.M)
+    assert len(forms) == 3
+    named = [re.findall(r"`([\w:]+)`(?: of `([\w-]+)`)?", form) for form in forms]
+    for path, crate in [named[0][0], named[1][0], *named[2][:2]]:
+        folder = ROOT / "crates" / (crate or path.partition("::")[0].replace("_", "-")) / "src"
+        defined = {name for source in folder.rglob("*.rs") for name in structure.DEFINED.findall(structure.bare(source.read_text()))}
+        assert path.rpartition("::")[2] in defined, path
+
+
+def test_how_a_search_decides_is_not_in_the_core_for_devices() -> None:
+    """What is known of a kind beforehand is; `arm-gap` makes questions and prices of it."""
+    core = structure.sources(ROOT, ["crates/arm-core/src"], ".rs")
+    policy = re.compile(r"\w*(?:search|candidate|evidence|likelihood|price|score|penalt|verdict|rival|hypothes)\w*", flags=re.I)
+    found = {path.name: words for path in core if (words := policy.findall(structure.bare(path.read_text(encoding="utf-8"))))}
+    assert len(core) > 50 and found == {}
+
+
 ALSO_QUANTITIES = {"inertia", "elastic", "force_gain", "angle_offset"}
 """Names of kinds that are also those of other quantities, and as strings say nothing."""
 
