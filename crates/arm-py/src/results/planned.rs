@@ -120,7 +120,7 @@ result_class! {
 
 result_class! {
     /// The run that comes closest to a record.
-    RunFit of by_simulation::Fit, in "armrs.analysis.fitting" {
+    RunFit of by_simulation::Fit, in "armrs.workflows.fitting" {
         /// Value of each free parameter, in its unit.
         values: Vec<f64>, "";
         /// Its standard deviation where the noise is white and of the sizes given, as if no bound held; infinite where the record is silent.
