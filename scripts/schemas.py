@@ -53,7 +53,7 @@ def kinds() -> list[Kind]:
 
 def effect(kind: Kind) -> Any:
     """Return the schema of an effect of one kind."""
-    places = {"joint": {"type": "integer", "minimum": kind.first_joint}, "channel": {"enum": list(FORCE_CHANNELS)}}
+    places = {"joint": {"type": ["integer", "string"], "minimum": kind.first_joint}, "channel": {"enum": list(FORCE_CHANNELS)}}
     address = {kind.address: places[kind.address]} if kind.address else {}
     values = {p.name: parameter(p) for p in kind.parameters}
     text = f"{kind.summary}. {kind.formula}"

@@ -199,6 +199,30 @@ def rust_functions(path: Path) -> Iterator[tuple[str, int]]:
         yield found[1], code.count("\n", found.start(), block_end(code, found.end())) + 1
 
 
+def calls(code: str, function: str) -> list[str]:
+    """Return what a function of bare source calls, in the order in which it stands there."""
+    found = next(found for found in FUNCTION.finditer(code) if found[1] == function)
+    return re.findall(r"\b([a-z_]\w*)\(", code[found.end() : block_end(code, found.end())])
+
+
+def folders_of_functions(source: Path) -> dict[str, str]:
+    """Return the folder of a crate in which each function is defined; names that are defined more than once are left out."""
+    places: dict[str, list[str]] = {}
+    for path in sorted(source.rglob("*.rs")):
+        for found in FUNCTION.finditer(bare(path.read_text(encoding="utf-8"))):
+            places.setdefault(found[1], []).append(path.relative_to(source).parts[0])
+    return {name: folders[0] for name, folders in places.items() if len(folders) == 1}
+
+
+def returns(rooms: Iterable[str]) -> dict[str, int]:
+    """Return how often a path comes back to each room that it has left."""
+    entered: dict[str, int] = {}
+    for before, room in pairwise(["", *rooms]):
+        if room != before:
+            entered[room] = entered.get(room, -1) + 1
+    return entered
+
+
 def leaves(tree: str) -> Iterator[tuple[list[str], str]]:
     """Yield path and name of everything that a `use` tree names; `a::{b, c as d}` names `a::b` as b and `a::c` as d."""
     head, brace, rest = tree.partition("{")
@@ -224,6 +248,13 @@ def variants(path: Path, enum: str) -> set[str]:
     """Return the variants of an enum that a Rust file names outside its tests."""
     code = bare(path.read_text(encoding="utf-8"))
     return set(re.findall(rf"\b{enum}::([A-Z]\w*)", code))
+
+
+def texts(path: Path) -> set[str]:
+    """Return the strings in a Rust file, before its tests."""
+    source = path.read_text(encoding="utf-8")
+    code = source[: len(TEST_MODULE.split(blanked(source))[0])]
+    return {found[0][1:-1] for found in LITERAL.finditer(code) if found[0].startswith('"')}
 
 
 @dataclass

@@ -55,6 +55,20 @@ def test_calibration_and_a_first_look(found: armrs.GapFound) -> None:
         assert gap.calibrated == pytest.approx(found.gap[name].calibrated, rel=1e-3)
 
 
+def test_a_tolerance_is_one_standard_deviation_of_what_is_refitted(found: armrs.GapFound) -> None:
+    """As for `identify`: a result states twice that beside each value."""
+    tolerance = found.dataset.tolerance
+    stated = {a.name: a.promised for a in found.absorbed}
+    expected = {
+        "angle offset of joint 1": tolerance.angle_offset,
+        "force bias of Fy": tolerance.force_bias_N,
+        "force gain of Fz": tolerance.force_gain,
+        "time delay": tolerance.time_delay_s,
+        "place of the robot, y": tolerance.handle_placement_m,
+    }
+    assert {name: stated[name] for name in expected} == pytest.approx({name: 2.0 * sd for name, sd in expected.items()})
+
+
 def test_the_stages_draw_themselves(found: armrs.GapFound, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(mpl.rcParams, "backend", "agg")
     data = found.dataset

@@ -306,24 +306,24 @@ def test_refuses_broken_motions(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["segfault.c3d", "endless.c3d"])
 def test_a_damaged_c3d_neither_crashes_nor_hangs(data: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("ezc3d")
-    from armrs.io import apart
+    from armrs.io import reader_process
 
-    monkeypatch.setattr(apart, "LONGEST", 5.0)
+    monkeypatch.setattr(reader_process, "LONGEST", 5.0)
     with pytest.raises(armrs.BadInput, match="a whole C3D file"):
         armrs.read_markers(data / "hostile" / name)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no processor time")
 def test_a_reader_that_waits_for_its_turn_is_not_taken_for_one_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from armrs.io import apart
+    from armrs.io import reader_process
 
     (tmp_path / "late_reader.py").write_text(
-        "import time\nfrom armrs.io import apart\n\ntime.sleep(3)\napart.serve(lambda path: {'size': path.stat().st_size})\n"
+        "import time\nfrom armrs.io import reader_process\n\ntime.sleep(3)\nreader_process.serve(lambda path: {'size': path.stat().st_size})\n"
     )
     (tmp_path / "data.bin").write_bytes(b"abc")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
-    monkeypatch.setattr(apart, "LONGEST", 2.0)
-    with apart.content("late_reader", tmp_path / "data.bin", "anything") as arrays:
+    monkeypatch.setattr(reader_process, "LONGEST", 2.0)
+    with reader_process.content("late_reader", tmp_path / "data.bin", "anything") as arrays:
         assert arrays["size"] == 3
 
 
@@ -331,12 +331,12 @@ def test_a_reader_that_waits_for_its_turn_is_not_taken_for_one_that_hangs(tmp_pa
 def test_a_file_is_read_under_the_lower_limits_of_a_batch_system(tmp_path: Path) -> None:
     """Raising a limit that the system had set ended in a traceback."""
     (tmp_path / "small_reader.py").write_text(
-        "import resource\nfrom armrs.io import apart\n\napart.serve(lambda path: {'most': resource.getrlimit(resource.RLIMIT_CPU)})\n"
+        "import resource\nfrom armrs.io import reader_process\n\nreader_process.serve(lambda path: {'most': resource.getrlimit(resource.RLIMIT_CPU)})\n"
     )
     read = (
-        "import resource\nfrom pathlib import Path\nfrom armrs.io import apart\n\n"
+        "import resource\nfrom pathlib import Path\nfrom armrs.io import reader_process\n\n"
         "resource.setrlimit(resource.RLIMIT_CPU, (40, 40))\n"
-        "with apart.content('small_reader', Path('small_reader.py'), 'anything') as arrays:\n    print(*arrays['most'])\n"
+        "with reader_process.content('small_reader', Path('small_reader.py'), 'anything') as arrays:\n    print(*arrays['most'])\n"
     )
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(

@@ -126,7 +126,7 @@ def test_clocks_apart_delay_the_angles(experiment: Path, tmp_path: Path) -> None
 
 def test_load_cells_read_the_brakes_and_muscles_their_activity(experiment: Path, tmp_path: Path) -> None:
     text = EXPERIMENT.replace("emg = true", "emg = true\nbrake_noise_Nm = 0.001")
-    burst = '[[effect]]\nkind = "voluntary"\njoint = 2\namplitude = 1.0\nstart = 0.5\nduration = 0.4\n\n[[movement]]'
+    burst = '[[effect]]\nkind = "voluntary"\njoint = "elbow"\namplitude = 1.0\nstart = 0.5\nduration = 0.4\n\n[[movement]]'
     experiment.write_text(text.replace("[[movement]]", burst), encoding="utf-8")
     trial = armrs.record(experiment, tmp_path / "out").dataset.trials[0]
     assert trial.tau is not None

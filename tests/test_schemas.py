@@ -35,7 +35,10 @@ MOVEMENT, EXPERIMENT, SWEEP = (SHOWN[name] for name in ("swing.toml", "EXPERIMEN
 TEXTS = {"model": MODEL, "dataset": DATASET, "movement": MOVEMENT, "experiment": EXPERIMENT, "sweep": SWEEP}
 
 
-@pytest.mark.parametrize(("name", "text"), TEXTS.items())
+BY_NAME = MODEL.replace("joint = 2", 'joint = "elbow"')
+
+
+@pytest.mark.parametrize(("name", "text"), [*TEXTS.items(), ("model", BY_NAME)])
 def test_what_the_readers_take_is_valid(name: str, text: str, tmp_path: Path) -> None:
     assert errors(name, text, tmp_path) == []
 
@@ -45,6 +48,7 @@ def test_what_the_readers_take_is_valid(name: str, text: str, tmp_path: Path) ->
     [
         ("model", "torque = 0.161", "torque = -1.0"),
         ("model", 'kind = "coulomb"', 'kind = "coulom"'),
+        ("model", "joint = 2", "joint = 0"),
         ("model", "viscosity = 0.25", "viskosity = 0.25"),
         ("model", "lengths = [0.45, 0.45]", "lengths = [0.45]"),
         ("dataset", 'role = "fit"', 'role = "train"'),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -77,13 +78,16 @@ def test_modules_are_loaded_by_name_in_two_places() -> None:
 
 
 def test_folders_do_not_know_what_is_above_them() -> None:
-    """The thesis is known to the command alone, the command to nothing, and what reads files knows no workflow and no report."""
+    """The thesis is known to the command alone, the command to nothing; what reads files and what is shared know no workflow and no report."""
     allowed = {
         "thesis": {"cli"},
         "cli": {"__main__"},
         "montecarlo": {"cli"},
     }
-    below = {"io": {"io", "model", "checks", "errors", "catalogue", "custom_effects", "views", "anthropometry", "tabular", "telling"}}
+    below = {
+        "io": {"io", "model", "checks", "errors", "catalogue", "custom_effects", "views", "anthropometry", "tabular", "telling"},
+        "analysis": {"analysis", "io", "model", "checks", "errors", "catalogue", "tabular"},
+    }
     for name, used in structure.python_imports(PACKAGE).items():
         room = name.split(".")[1]
         for other in used:
@@ -94,10 +98,48 @@ def test_folders_do_not_know_what_is_above_them() -> None:
                 assert known in below[room], f"{name} imports {other}"
 
 
+def test_the_path_of_find_gap_does_not_go_back_and_forth() -> None:
+    """From the call in Python to the verdict, by what the functions that lead it call themselves."""
+    gap = PACKAGE / "workflows" / "gap"
+    asked = [name for part in ("suspicion", "search") for name in re.findall(r"_armrs\.([a-z]\w+)", (gap / f"{part}.py").read_text())]
+    assert asked == ["reach", "play", "find_gap"]
+    core = ROOT / "crates" / "arm-gap" / "src"
+    folders = structure.folders_of_functions(core)
+    selection = [structure.bare((core / "selection" / f"{name}.rs").read_text()) for name in ("search", "conclusion")]
+    led = [*structure.calls(selection[0], "search"), *structure.calls(selection[1], "concluded")]
+    rooms = ["data", *(folders[name] for name in led if name in folders), "results"]
+    assert rooms.count("selection") > 5
+    assert max(structure.returns(rooms).values()) + len(asked) <= 5
+
+
+def test_a_parameter_has_three_forms_on_its_way_to_a_report() -> None:
+    """Those that the architecture lists, and they exist."""
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    forms = re.findall(r"^\d\. (.+)", page.partition("## The forms of a parameter")[2].partition("\n## ")[0], flags=re.M)
+    assert len(forms) == 3
+    named = [re.findall(r"`([\w:]+)`(?: of `([\w-]+)`)?", form) for form in forms]
+    for path, crate in [named[0][0], named[1][0], *named[2][:2]]:
+        folder = ROOT / "crates" / (crate or path.partition("::")[0].replace("_", "-")) / "src"
+        defined = {name for source in folder.rglob("*.rs") for name in structure.DEFINED.findall(structure.bare(source.read_text()))}
+        assert path.rpartition("::")[2] in defined, path
+
+
+def test_how_a_search_decides_is_not_in_the_core_for_devices() -> None:
+    """What is known of a kind beforehand is; `arm-gap` makes questions and prices of it."""
+    core = structure.sources(ROOT, ["crates/arm-core/src"], ".rs")
+    policy = re.compile(r"\w*(?:search|candidate|evidence|likelihood|price|score|penalt|verdict|rival|hypothes)\w*", flags=re.I)
+    found = {path.name: words for path in core if (words := policy.findall(structure.bare(path.read_text(encoding="utf-8"))))}
+    assert len(core) > 50 and found == {}
+
+
+ALSO_QUANTITIES = {"inertia", "elastic", "force_gain", "angle_offset"}
+"""Names of kinds that are also those of other quantities, and as strings say nothing."""
+
 NAMED = {
     "crates/arm-cosim/src/spec.rs": "a sample",
     "crates/arm-gap/src/measurement_model/start.rs": "the torque that holds a joint is a constant moment",
     "crates/arm-model/src/joint.rs": "the keys of a joint are short for effects",
+    "crates/arm-py/src/model/parts.rs": "the keys of a joint",
     "crates/arm-sim/src/models.rs": "samples",
 }
 """Files that name a kind of effect, and why."""
@@ -106,32 +148,43 @@ NAMED = {
 def test_a_kind_of_effect_is_named_in_its_own_file() -> None:
     """Other code asks a kind for its properties, so that a new one needs no more than its file and a line of the catalogue."""
     own = ROOT / "crates" / "arm-core" / "src" / "effect"
-    kinds = {path.stem.title().replace("_", "") for path in own.glob("*.rs")} - {"Own", "OwnAbsent"}
+    names = {path.stem for path in own.glob("*.rs")} - {"own", "own_absent"}
+    kinds = {name.title().replace("_", "") for name in names}
     assert {"Coulomb", "StretchReflex"} <= kinds
     crates = [path for path in RUST if not is_test(path) and own not in path.parents and "examples" not in path.parts]
-    named = {path.relative_to(ROOT).as_posix() for path in crates if structure.variants(path, "Kind") & kinds}
+
+    def is_named(path: Path) -> bool:
+        in_words = structure.texts(path) & {kind.kind for kind in catalogue().values()} - ALSO_QUANTITIES
+        return bool(in_words or structure.variants(path, "Kind") & kinds)
+
+    named = {path.relative_to(ROOT).as_posix() for path in crates if is_named(path)}
     assert {name for name in named if name.startswith("crates/")} - {"crates/crosscheck/src/digests.rs"} == set(NAMED)
 
 
 NAMED_IN_PYTHON = {
     "io/multibody/joints.py": "a rotor is what other formats call armature",
     "io/multibody/mjcf.py": "a fixed tendon is a spring over two joints",
+    "io/multibody/osim.py": "the friction that a joint has no key for in OpenSim",
+    "io/multibody/urdf.py": "friction of a joint is Coulomb's",
     "report/clinic.py": "the numbers that a clinician reads, in plain words",
     "workflows/demo.py": "the brakes that the demo hides",
     "workflows/plan_stretches.py": "stretches are planned for reflexes",
     "workflows/record.py": "a torque that differs between repeats is a constant moment",
     "workflows/spasticity.py": "what is asked is the reflex",
+    "workflows/stiction.py": "the key of a joint for dry friction",
 }
 """Modules of the package, but for the thesis, that name a kind of effect, and why."""
 
 
 def test_python_names_no_kind_of_effect_without_a_reason() -> None:
-    """Names that are also those of other quantities, such as `inertia` and `elastic`, say nothing."""
-    kinds = {k.kind for k in catalogue().values()} - {"inertia", "elastic", "force_gain", "angle_offset"}
+    """As a string, an attribute or a keyword."""
+    kinds = {k.kind for k in catalogue().values()} - ALSO_QUANTITIES
+    parts: dict[type[ast.AST], str] = {ast.Constant: "value", ast.Attribute: "attr", ast.keyword: "arg"}
     found = set()
     for path in PACKAGE.rglob("*.py"):
-        strings = (node.value for node in ast.walk(structure.parsed(path)) if isinstance(node, ast.Constant))
-        if path.parent.name != "thesis" and kinds & {s for s in strings if isinstance(s, str)}:
+        nodes = [node for node in ast.walk(structure.parsed(path)) if type(node) in parts]
+        names = (getattr(node, parts[type(node)]) for node in nodes)
+        if path.parent.name != "thesis" and kinds & {name for name in names if isinstance(name, str)}:
             found.add(path.relative_to(PACKAGE).as_posix())
     assert found == set(NAMED_IN_PYTHON)
 
@@ -221,6 +274,16 @@ def test_a_circle_of_python_modules_is_found(tmp_path: Path) -> None:
 def test_variants_are_found_outside_tests_alone(tmp_path: Path) -> None:
     source = "fn f() { Kind::Coulomb; } // Kind::Viscous\n#[cfg(test)]\nmod tests { use Kind::Elastic; }"
     assert structure.variants(tree(tmp_path, {"a.rs": source}) / "a.rs", "Kind") == {"Coulomb"}
+
+
+def test_returns_are_counted_by_room() -> None:
+    assert structure.returns("aabacb") == {"a": 1, "b": 1, "c": 0}
+    assert structure.calls("fn f() { g(); h(1) } fn g() { f(); }", "f") == ["g", "h"]
+
+
+def test_strings_are_found_outside_comments_and_tests(tmp_path: Path) -> None:
+    source = '// "viscous"\nconst S: &str = "coulomb";\n#[cfg(test)]\nmod tests { const T: &str = "elastic"; }'
+    assert structure.texts(tree(tmp_path, {"a.rs": source}) / "a.rs") == {"coulomb"}
 
 
 def test_what_is_loaded_by_name_is_found(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def segments_off(model: Model) -> list[tuple[Model, float]]:
 
 
 def sensors_off(still: np.ndarray, tolerance: armrs.Tolerance, n_joints: int) -> list[np.ndarray]:
-    """Return what one standard deviation (half of what is allowed) of each error of the calibration changes."""
+    """Return what one standard deviation of each error of the calibration changes: half of the tolerance, as `src/sensor.rs` draws them."""
     columns = []
 
     def add(where: int | slice, change: Any) -> None:

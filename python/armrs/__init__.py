@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from . import online as online
     from ._armrs import Arm as Arm
     from ._armrs import __version__ as __version__
-    from .analysis.fitting import SimulationFit as SimulationFit
-    from .analysis.fitting import fit_by_simulation as fit_by_simulation
     from .anthropometry import Expected as Expected
     from .anthropometry import segment_expectations as segment_expectations
     from .catalogue import Parameter as Parameter
@@ -68,6 +66,8 @@ if TYPE_CHECKING:
     from .workflows.demo import run_demo as run_demo
     from .workflows.firmware import FirmwareSource as FirmwareSource
     from .workflows.firmware import export_c as export_c
+    from .workflows.fitting import SimulationFit as SimulationFit
+    from .workflows.fitting import fit_by_simulation as fit_by_simulation
     from .workflows.gap import GapFound as GapFound
     from .workflows.gap import find_gap as find_gap
     from .workflows.identify import Estimate as Estimate
@@ -113,7 +113,7 @@ _HOMES = {
     "workflows.firmware": ("FirmwareSource", "export_c"),
     "workflows.gap": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "ArmrsWarning", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
-    "analysis.fitting": ("SimulationFit", "fit_by_simulation"),
+    "workflows.fitting": ("SimulationFit", "fit_by_simulation"),
     "fmu.check": ("check_fmu",),
     "fmu.export": ("export_fmu",),
     "workflows.identify": ("Estimate", "Identified", "identify"),

@@ -64,6 +64,11 @@ def segment_expectations(
     tuple of Expected
         One for each of `lengths`.
 
+    Raises
+    ------
+    BadInput
+        For values out of range.
+
     Notes
     -----
     Means: de Leva (1996), J. Biomech. 29, table 4. Standard deviations: regressions of Zatsiorsky and Seluyanov (1983, 1985).

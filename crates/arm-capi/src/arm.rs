@@ -8,7 +8,7 @@ use arm_period::armrs_status::{self, *};
 use arm_period::call::{ended, given, numbers, place};
 use arm_period::held::Held;
 
-use crate::refusal::{Refusal, armrs_problem, told};
+use crate::refusal::{Refusal, armrs_problem, status_of};
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, Kept, armrs_arm, armrs_real};
 
 /// One rigid segment.
@@ -136,7 +136,7 @@ pub unsafe extern "C" fn armrs_arm_init(
         Ok(())
     };
     // SAFETY: as promised by the caller.
-    unsafe { told(run(), problem) }
+    unsafe { status_of(run(), problem) }
 }
 
 /// The effects of a list, and none in the other places.

@@ -5,7 +5,7 @@ use arm_period::armrs_status;
 use arm_period::call::{given, numbers, place};
 use arm_period::held::Held;
 
-use crate::refusal::{armrs_problem, told};
+use crate::refusal::{armrs_problem, status_of};
 use crate::{ARMRS_UNKNOWNS, armrs_arm, armrs_compensation, armrs_real};
 
 /// Makes it from the values of the unknowns of an arm and their covariance, row by row, of which the lower triangle is read. What is known
@@ -37,5 +37,5 @@ pub unsafe extern "C" fn armrs_compensation_init(
         Ok(())
     };
     // SAFETY: as promised by the caller.
-    unsafe { told(run(), problem) }
+    unsafe { status_of(run(), problem) }
 }

@@ -5,7 +5,7 @@ use arm_period::armrs_status;
 use arm_period::call::{ended, given, place};
 use arm_period::held::Held;
 
-use crate::refusal::{armrs_problem, told};
+use crate::refusal::{armrs_problem, status_of};
 use crate::{ARMRS_JOINTS, armrs_arm, armrs_estimator, armrs_real};
 
 /// How an estimator works; `armrs_estimator_settings` fills it for an arm, with every guard on. Infinite values switch one off.
@@ -110,5 +110,5 @@ pub unsafe extern "C" fn armrs_estimator_init(
         Ok(())
     };
     // SAFETY: as promised by the caller.
-    unsafe { told(run(), problem) }
+    unsafe { status_of(run(), problem) }
 }

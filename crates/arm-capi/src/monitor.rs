@@ -5,7 +5,7 @@ use arm_period::armrs_status::{self, *};
 use arm_period::call::{given, place};
 use arm_period::held::Held;
 
-use crate::refusal::{Refusal, armrs_problem, told};
+use crate::refusal::{Refusal, armrs_problem, status_of};
 use crate::{ARMRS_CHANNELS, armrs_monitor, armrs_real};
 
 /// What a channel measures.
@@ -86,7 +86,7 @@ pub unsafe extern "C" fn armrs_monitor_init(
         Ok(())
     };
     // SAFETY: as promised by the caller.
-    unsafe { told(run(), problem) }
+    unsafe { status_of(run(), problem) }
 }
 
 /// A number from outside may be no quantity at all, so that it is not taken as the enum.

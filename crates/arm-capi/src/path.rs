@@ -5,7 +5,7 @@ use arm_period::armrs_status::{self, *};
 use arm_period::call::{finite, given, joints, numbers, place};
 use arm_period::held::Held;
 
-use crate::refusal::{Refusal, armrs_problem, told};
+use crate::refusal::{Refusal, armrs_problem, status_of};
 use crate::{ARMRS_JOINTS, ARMRS_WAYPOINTS, armrs_path, armrs_real};
 
 /// What a movement must not exceed.
@@ -80,5 +80,5 @@ pub unsafe extern "C" fn armrs_path_init(
         Ok(())
     };
     // SAFETY: as promised by the caller.
-    unsafe { told(run(), problem) }
+    unsafe { status_of(run(), problem) }
 }

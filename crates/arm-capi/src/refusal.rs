@@ -96,7 +96,7 @@ impl From<Invalid> for Refusal {
 ///
 /// # Safety
 /// `problem` is null or points to a place for one.
-pub(crate) unsafe fn told(
+pub(crate) unsafe fn status_of(
     result: Result<(), Refusal>,
     problem: *mut armrs_problem,
 ) -> armrs_status {

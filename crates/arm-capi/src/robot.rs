@@ -5,7 +5,7 @@ use arm_period::armrs_status;
 use arm_period::call::{numbers, place};
 use arm_period::held::Held;
 
-use crate::refusal::{armrs_problem, told};
+use crate::refusal::{armrs_problem, status_of};
 use crate::{armrs_real, armrs_robot};
 
 /// Makes a robot from two lengths and the position of its first joint [m]; `elbow_up`: on which side the elbow is, seen on
@@ -34,5 +34,5 @@ pub unsafe extern "C" fn armrs_robot_init(
         Ok(())
     };
     // SAFETY: as promised by the caller.
-    unsafe { told(run(), problem) }
+    unsafe { status_of(run(), problem) }
 }

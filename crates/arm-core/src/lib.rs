@@ -18,6 +18,10 @@
 //! ```
 #![no_std]
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod anthropometry;
 mod body;
 mod calibration;

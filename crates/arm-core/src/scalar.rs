@@ -55,7 +55,7 @@ pub trait Scalar:
     ///
     /// Largest error found against 160-bit arithmetic at 60 000 angles of each range: 1.01 units in the last place within
     /// ±0.8, 1.45 within ±10³, 2.1 within ±10⁵ (absolute 1.5·10⁻¹⁶); in single precision 7·10⁻⁸ absolute. NaN from 10¹⁶ on, in
-    /// single precision from 10⁸, where no angle can be told.
+    /// single precision from 10⁸, where an angle has no digit left.
     fn sin_cos(self) -> (Self, Self);
     /// [`Scalar::sin_cos`] of several angles \[rad\]: all sines, all cosines.
     #[inline(always)]

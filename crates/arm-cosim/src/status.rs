@@ -6,9 +6,9 @@ use arm_sim::SimulationError;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
 pub enum Status {
-    /// As asked.
+    /// Done.
     Ok = 0,
-    /// As asked, with something to say.
+    /// Done, with a message.
     Warning = 1,
     /// Not done, and the state is as before: another value or a shorter step may do.
     Discard = 2,

@@ -47,7 +47,7 @@ pub struct TrialName {
     pub configuration: String,
 }
 
-/// What an identification was asked about, as the files have it.
+/// The question to an identification, in the terms of the files.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<'a> {
     /// The model as given.

@@ -87,7 +87,7 @@ impl AddedMass {
     }
 }
 
-/// A muscle whose activity a channel tells, and the joint that it moves.
+/// A muscle, the channel with its activity, and the joint that it moves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Muscle {
     /// Name of its column.

@@ -201,6 +201,15 @@ impl Effect {
     /// # Errors
     /// [`Refused`] for an unknown kind, an unknown or missing key and a value out of bounds.
     pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
+        Self::from_value_on(&[], place, value)
+    }
+
+    /// Reads a table `[[effect]]` of an arm with joints of these names, which may give the number of a joint or its name.
+    pub(crate) fn from_value_on(
+        joints: &[&str],
+        place: &str,
+        value: Value,
+    ) -> Result<Self, Refused> {
         let mut fields = Fields::new(place, value)?;
         let name = fields.required_text("kind")?;
         let named = if place.is_empty() {
@@ -208,8 +217,12 @@ impl Effect {
         } else {
             format!("{place} ({})", shortened(&name))
         };
-        let site = [fields.take("joint"), fields.take("channel")];
-        Self::of_kind(&name, site, fields.rest()).map_err(|refused| refused.within(&named))
+        let joint = fields.take("joint").map(|value| numbered(value, joints));
+        let channel = fields.take("channel");
+        joint
+            .transpose()
+            .and_then(|joint| Self::of_kind(&name, [joint, channel], fields.rest()))
+            .map_err(|refused| refused.within(&named))
     }
 
     /// Reads an effect whose kind is named, from joint, channel and the table of its parameters.
@@ -287,6 +300,23 @@ impl Effect {
 
 fn index(number: i64) -> usize {
     usize::try_from(number - 1).unwrap_or(usize::MAX)
+}
+
+/// The number of a joint that is called by its name; any other value as it is, and a name where there are no joints.
+fn numbered(value: Value, joints: &[&str]) -> Result<Value, Refused> {
+    let name = match &value {
+        Value::Text(name) if !joints.is_empty() => name,
+        _ => return Ok(value),
+    };
+    let mut called = (1_i64..).zip(joints).filter(|(_, joint)| *joint == name);
+    match (called.next(), called.next()) {
+        (Some((number, _)), None) => Ok(Value::Integer(number)),
+        (Some(_), Some(_)) => {
+            let allowed = "the number of the joint: several have this name";
+            Err(Refused::new("joint", value.shown(), allowed))
+        }
+        (None, _) => Err(unknown("joint", name, "joint", joints)),
+    }
 }
 
 by_value!(Effect);

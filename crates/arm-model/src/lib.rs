@@ -28,6 +28,10 @@
 //! # Ok::<(), arm_model::Refused>(())
 //! ```
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod catalogue;
 mod contact;
 mod dataset;

@@ -226,15 +226,17 @@ impl Model {
         let segments = arm.tables("segment", "arm.segment")?;
         let joints = arm.tables("joint", "arm.joint")?;
         let effects = document.tables("effect", "effect")?;
+        let joints = each("[[arm.joint]]", "joint", joints, Joint::from_value)?;
+        let names: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
         let parts = Parts {
             segments: each("[[arm.segment]]", "segment", segments, Segment::from_value)?,
-            joints: each("[[arm.joint]]", "joint", joints, Joint::from_value)?,
             robot: optional(&mut document, "robot", Robot::from_value)?,
             contact: optional(&mut document, "contact", Contact::from_value)?,
             effects: (1..)
                 .zip(effects)
-                .map(|(k, table)| Effect::from_value(&format!("[[effect]] {k}"), table))
+                .map(|(k, table)| Effect::from_value_on(&names, &format!("[[effect]] {k}"), table))
                 .collect::<Result<_, _>>()?,
+            joints,
             ..Parts::default()
         };
         Self::new(parts.with_numbers(arm)?)

@@ -16,7 +16,7 @@ pub const UNKNOWNS: usize = 18;
 /// The equation of motion as the C interface holds it.
 pub type DeviceEquation<T, const N: usize> = Equation<T, N, UNKNOWNS, EFFECTS>;
 
-/// What a device is told of a model.
+/// What a device needs of a model.
 ///
 /// Parameters
 /// ----------
@@ -40,8 +40,8 @@ pub fn firmware<'py>(
     samples: Vec<Vec<f64>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     match &rig.arm.chain {
-        AnyChain::Two(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
-        AnyChain::Three(chain) => told(py, chain, &rig.effects, uncertainty, &samples),
+        AnyChain::Two(chain) => firmware_values(py, chain, &rig.effects, uncertainty, &samples),
+        AnyChain::Three(chain) => firmware_values(py, chain, &rig.effects, uncertainty, &samples),
         _ => Err(too_long(rig)),
     }
 }
@@ -55,7 +55,7 @@ pub fn too_long(rig: &Rig) -> PyErr {
     )
 }
 
-fn told<'py, const N: usize>(
+fn firmware_values<'py, const N: usize>(
     py: Python<'py>,
     chain: &Chain<f64, N>,
     effects: &[Effect<f64>],

@@ -35,7 +35,7 @@ pub struct Settings {
     /// What the samples of each trial weigh; see [`Session::weights`].
     weights: Vec<f64>,
     threads: usize,
-    /// Names of kinds of one's own that are asked besides the catalogue.
+    /// Names of user-defined kinds that are tested besides the catalogue.
     own: Vec<String>,
 }
 
@@ -231,7 +231,7 @@ pub fn look(
     each_short_length!(&rig.arm.chain, c => run(py, c, &call, progress.as_ref()))
 }
 
-/// Who is told of the work, and what was raised to stop it.
+/// The callback for progress, and what was raised to stop the work.
 struct ProgressCallback<'a> {
     callable: Option<&'a Py<PyAny>>,
     raised: Mutex<Option<PyErr>>,

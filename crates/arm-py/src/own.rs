@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::errors::{bad_input, invalid, refused};
 
-/// What a callable raised while the core asked it.
+/// What a callable raised while the core called it.
 static FAILED: Mutex<Option<PyErr>> = Mutex::new(None);
 
 thread_local! {

@@ -50,7 +50,7 @@ impl Default for Controller {
 /// Something that goes wrong on purpose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// The motor of a joint gives all its torque, whatever it is told.
+    /// The motor of a joint gives all its torque, whatever the command.
     Runaway(usize),
     /// The encoder of a joint keeps its value.
     Frozen(usize),

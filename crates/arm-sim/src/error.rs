@@ -19,8 +19,8 @@ pub enum SimulationError {
         /// The values allowed, in words.
         allowed: &'static str,
     },
-    /// An effect that depends on muscle activity, of which nothing is told.
-    #[error("{kind} depends on muscle activity, of which nothing is told")]
+    /// An effect that depends on muscle activity, where none is given.
+    #[error("{kind} depends on muscle activity, and none is given")]
     NoActivity {
         /// Kind of the effect.
         kind: &'static str,
@@ -90,7 +90,7 @@ pub enum SimulationError {
         damping: f64,
         /// Largest stable step \[s\].
         largest: f64,
-        /// The step asked for \[s\].
+        /// Requested step \[s\].
         dt: f64,
     },
     /// The state ceased to be finite.
@@ -121,7 +121,7 @@ pub enum SimulationError {
         "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {asked:e} rad; steps shorter than 1e-6 s are not tried"
     )]
     Accuracy {
-        /// Accuracy asked for \[rad\].
+        /// Requested accuracy \[rad\].
         asked: f64,
         /// Estimated error at the shortest step \[rad\].
         reached: f64,

@@ -235,7 +235,7 @@ impl<const N: usize> Part<'_, N> {
         margin
     }
 
-    /// Makes the step up to the first switch, and tells where that is.
+    /// Makes the step up to the first switch, and returns where that is.
     ///
     /// * `after` - where it was tried to end it, and the margin there
     fn locate(

@@ -8,9 +8,9 @@ use nalgebra::SMatrix;
 
 /// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
 const THETA: f64 = 0.55;
-/// Change of an angle by which slopes are told \[rad\].
+/// Change of an angle for difference quotients \[rad\].
 const ANGLE: f64 = 1e-6;
-/// Change of a speed by which slopes are told \[rad/s\].
+/// Change of a speed for difference quotients \[rad/s\].
 const SPEED: f64 = 1e-5;
 
 /// How the torques of the equation of motion, and a force, follow the motion around one instant.

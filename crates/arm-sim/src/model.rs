@@ -8,7 +8,7 @@ use arm_core::{
     Setup, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
 };
 
-use crate::plain::{Plain, affine, apart, load, pull};
+use crate::plain::{Plain, affine, contact_gap, load, pull};
 use crate::state::{Input, Outcome, State, difference, powers, sum};
 use crate::terms::{MovingBase, Terms, add_inertia, first_moment_rows};
 
@@ -425,7 +425,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             Link::Free | Link::Rigid => return ([T::ZERO; 2], T::ZERO),
         };
         let (at, v) = (self.tip(q, pose), self.tip_velocity(qd, pose));
-        let (gap, rate) = apart(&input.handle, at, v);
+        let (gap, rate) = contact_gap(&input.handle, at, v);
         pull(contact.spring_and_damper(gap, rate), rate)
     }
 

@@ -31,7 +31,7 @@ impl<T: Scalar, const N: usize> Plain<T, N> {
     ) -> Outcome<T, N> {
         let (still, resisting) = (Joints::<T, N>::repeat(T::ZERO), affine(&self.affine, q, qd));
         let (at, v) = (tip(&self.chain, pose), tip_velocity(&self.chain, pose, qd));
-        let (gap, rate) = apart(handle, at, v);
+        let (gap, rate) = contact_gap(handle, at, v);
         let (force, lost) = pull(self.contact.linear(gap, rate), rate);
         let net = load(&difference(&still, &resisting), force);
         let [led, _, resisted, _] =
@@ -80,7 +80,7 @@ pub(crate) fn affine<T: Scalar, const N: usize>(
 
 /// Gap between the handle and a tip at `at` that moves with `v`, and its rate.
 #[inline(always)]
-pub(crate) fn apart<T: Scalar>(
+pub(crate) fn contact_gap<T: Scalar>(
     handle: &Handle<T>,
     at: Plane<T>,
     v: Plane<T>,

@@ -45,7 +45,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
         in_pieces: bool,
     ) -> Result<Self, SimulationError> {
         let schedule = Schedule::of(experiment)?;
-        told(&experiment.effects, experiment.activity.is_some())?;
+        refuse_unknown_activity(&experiment.effects, experiment.activity.is_some())?;
         let setup = experiment.altered()?;
         let mut model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
         model.heaves |= experiment.base.is_some();
@@ -175,7 +175,7 @@ pub(crate) fn commands<const N: usize>(
     with_measured(experiment, &mut out[from..]);
 }
 
-/// Moves the base along its measured path, and tells the activity of muscles, where there is one.
+/// Moves the base along its measured path, and sets the activity of muscles, where there is one.
 #[inline]
 fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input<f64, N>]) {
     if let Some(path) = &experiment.base {
@@ -191,8 +191,11 @@ fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input
     }
 }
 
-/// Refuses effects that depend on muscle activity where nothing tells it.
-pub(crate) fn told(effects: &[Effect<f64>], activity: bool) -> Result<(), SimulationError> {
+/// Refuses effects that depend on muscle activity where none is given.
+pub(crate) fn refuse_unknown_activity(
+    effects: &[Effect<f64>],
+    activity: bool,
+) -> Result<(), SimulationError> {
     let deaf = |e: &&Effect<f64>| e.on && e.kind.feels_activity() && !activity;
     match effects.iter().find(deaf) {
         Some(effect) => Err(SimulationError::NoActivity {

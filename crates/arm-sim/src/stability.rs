@@ -54,6 +54,7 @@ impl Vibration {
     }
 }
 
+/// Radius of the largest half disc in the left half plane in which the fourth-order method is stable: 2.6155, rounded down.
 const RK4_RADIUS: f64 = 2.61;
 
 /// Refuses a contact that is too stiff for the step, judged at one pose.

@@ -295,6 +295,7 @@ fn balanced<const N: usize>(
 
 /// Largest change of a torque with an angle \[N m/rad\]; 1 where none changes.
 fn stiffness(residual: &impl Fn(&[f64]) -> Vec<f64>, x: &[f64], joints: usize) -> f64 {
+    /// Step of the difference quotient \[rad\].
     const SMALL: f64 = 1e-6;
     let here = residual(x);
     let mut largest: f64 = 0.0;

@@ -8,7 +8,7 @@ use crate::experiment::altered;
 use crate::friction::{self, advance};
 use crate::model::{Link, Model};
 use crate::native::{diverged, why};
-use crate::prepare::{assemble, told};
+use crate::prepare::{assemble, refuse_unknown_activity};
 use crate::state::{BaseMotion, Input, State};
 use crate::step::{Inputs, Memory};
 use crate::{Handle, Integrator, SimulationError, stability, start};
@@ -179,7 +179,7 @@ impl<const N: usize> Stepper<N> {
                 allowed: "a positive number of seconds",
             });
         }
-        told(effects, false)?;
+        refuse_unknown_activity(effects, false)?;
         let setup = altered(setup, effects)?;
         let link = match port {
             Port::Force => Link::Forced([0.0; 2]),

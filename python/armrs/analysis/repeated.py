@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_TURNS = 30
+_ITERATIONS = 30
 """In which shape and levels are fitted: each leaves of the error about the share of values that is missing."""
 
 
@@ -30,7 +30,7 @@ def completed(values: np.ndarray, broken: np.ndarray) -> np.ndarray:
     of least squares, fitted in turn.
     """
     level, shape = np.zeros(len(values)), mean(values)
-    for _ in range(_TURNS):
+    for _ in range(_ITERATIONS):
         level = mean((values - shape).T)
         shape = mean(values - level[:, None])
     return np.where(broken[:, None] & ~np.isfinite(values), shape + level[:, None], values)

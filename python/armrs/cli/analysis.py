@@ -184,7 +184,7 @@ def _after_gap(verdict: str, dataset: Path, folder: Path | None) -> str:
     if folder is None:
         return f"armrs gap {quoted(dataset)} -o gap writes a report with figures, and the amended model"
     if verdict == "unexplained":
-        return f"{folder / 'report.html'} shows when and in which channel the gap is open; armrs check {quoted(dataset)} asks the sensors"
+        return f"{folder / 'report.html'} shows when and in which channel the gap is open; armrs check {quoted(dataset)} checks the sensors"
     return f"armrs report {quoted(folder / 'gap.json')} --summary -o clinic writes one page in plain words"
 
 

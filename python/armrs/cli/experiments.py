@@ -40,9 +40,7 @@ class Coupling(str, enum.Enum):
     rigid = "rigid"
 
 
-Step = Annotated[
-    float | None, typer.Option(help="Step [s], above 0; when absent 0.00025, or as much shorter as steep dry friction asks for.")
-]
+Step = Annotated[float | None, typer.Option(help="Step [s], above 0; when absent 0.00025, or shorter where steep dry friction needs it.")]
 Accuracy = Annotated[
     float | None,
     typer.Option(help="Largest error of an angle [rad], instead of a step: a step that keeps it is found by comparing runs."),
@@ -137,7 +135,7 @@ def simulate(
 
 def plan(
     context: typer.Context,
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml: the arm as it is believed to be, and the robot.")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml: your model of the arm, and the robot.")],
     angles_deg: Annotated[str, typer.Option(metavar="LOW:HIGH,…", help="Range of each joint [deg], first joint first.")],
     out: MaybeFolder = None,
     with_: Annotated[

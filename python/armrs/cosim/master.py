@@ -20,10 +20,12 @@ MOST_CREATED = 0.02
 MOST_IN_STEPS = 0.1
 """The same of the magnitudes summed over steps."""
 WORTH_A_WARNING = 0.005
+"""Share of the energy that went through, above which a coupling that stays stable has a warning."""
 _PORT_INPUTS = ("handle.F[", "robot.v[")
 _LITTLE = 1e-6
 """Energy below which a share says nothing [J]."""
 _ITERATIONS = 25
+"""Most steps with one Jacobian at a communication point, which each step corrects."""
 LITTLE = 1e-3
 """Least change of a variable that errors are compared with, in units of its nominal value."""
 

@@ -7,6 +7,7 @@ import math
 from .system import System
 
 _SAFETY = 0.8
+"""Share that is taken of the step with which the error would be just what is allowed."""
 _LEAST, _MOST = 0.25, 2.0
 """Least and largest ratio of the length of a step to that of the last."""
 _REPEATED = 2.0

@@ -45,7 +45,7 @@ class Slave(Partner):
     Examples
     --------
     >>> from armrs.cosim import Slave
-    >>> from armrs.demo import true_model
+    >>> from armrs.workflows.demo import true_model
     >>> arm = Slave(true_model(), start=[-1.0, 0.5])
     >>> arm.enter_initialization_mode(0.0)
     >>> arm.exit_initialization_mode()

@@ -17,9 +17,11 @@ from .trial import Trial
 _MOST_TRIED = 200
 """Most changes of one variable after which another is read."""
 _MOST_EVENTS = 100
+"""Most updates of the discrete states at one event."""
 _NOISE = 1e-6
 """Relative change of a value that solving equations by iteration may cause."""
 _DIFFERENCE = 1e-6
+"""Relative step of the difference quotients that derivatives are compared with."""
 _DERIVATIVE_OFF = 1e-3
 """Relative difference from a finite difference that a directional derivative may have: it is to find wrong formulas, not rounding."""
 

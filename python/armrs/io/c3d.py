@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArmrsError, BadInput, Text
-from . import apart
+from . import reader_process
 
 _BLOCK = 512
 
@@ -66,7 +66,7 @@ def read(path: Path) -> C3D:
     if find_spec("ezc3d") is None:
         raise ArmrsError('C3D files need ezc3d: pip install "armrs[files]"')
     _check_header(path)
-    with apart.content("armrs.io.c3d", path, "a whole C3D file") as arrays:
+    with reader_process.content("armrs.io.c3d", path, "a whole C3D file") as arrays:
         return _checked(arrays)
 
 
@@ -150,4 +150,4 @@ def _arrays(path: Path) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    apart.serve(_arrays)
+    reader_process.serve(_arrays)

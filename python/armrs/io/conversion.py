@@ -16,6 +16,7 @@ from .dataset import FILE, describe, described_model, name_of, output_names
 from .samples import NUMBER, SUFFIXES, csv_place, explain_csv, header_of, parquet_table, write_table
 
 _EXACT = 2.0**53
+"""Below it a float holds every whole number."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,12 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     -----
     Numbers are float64, or int64 where float64 would not hold them. A missing sample is an empty cell in CSV and null in Parquet; NaN in
     Parquet counts as missing too.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> armrs.convert("session", "parquet", to="parquet")[0].name
+    'slow_1.parquet'
     """
     suffix = "." + checks.choice("to", to, tuple(s[1:] for s in SUFFIXES))
     path = checks.path("source", source)

@@ -218,6 +218,13 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     -----
     Uneven time stamps are resampled at the median rate, see `armrs.io.resample`; the samples as read stay in `Trial.original`.
     Missing samples are bridged over at most 0.25 s; longer gaps stay NaN and are reported in `warnings`.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> data = armrs.load_dataset("session")
+    >>> data.trials[0].q.shape
+    (100, 2)
     """
     path, description = describe(source)
     folder = path.parent
@@ -367,9 +374,20 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     Path
         The `dataset.toml` written. Everything is written or nothing.
 
+    Raises
+    ------
+    BadInput
+        For a format that is none of these, and a folder that is a file.
+
     Notes
     -----
     Samples that were missing are written as empty cells, not as measured.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> armrs.write_dataset(armrs.load_dataset("session"), "copy", suffix=".parquet").name
+    'dataset.toml'
     """
     checks.instance("dataset", dataset, Dataset)
     out = files.output_folder(folder)

@@ -25,6 +25,14 @@ _FORMATS = tuple(suffix[1:] for suffix in (*SUFFIXES, *MOTION_SUFFIXES))
 def read_markers(path: str | os.PathLike[str]) -> Markers:
     """Read marker trajectories from a C3D or TRC file; positions in metres, NaN where a marker was not seen.
 
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Markers
+
     Raises
     ------
     BadInput
@@ -65,6 +73,11 @@ def convert_markers(
     PlanarMotion
     tuple of str
         What the reader has to tell.
+
+    Raises
+    ------
+    BadInput
+        For a file that cannot be read, and points that it does not have.
     """
     path = checks.path("source", source)
     target = files.output_folder(folder) / path.with_suffix(f".{checks.choice('to', to, _FORMATS)}").name
@@ -95,6 +108,11 @@ def convert_motion(source: str | os.PathLike[str], folder: str | os.PathLike[str
     -------
     Path
         The file written.
+
+    Raises
+    ------
+    BadInput
+        For a file that cannot be read, and coordinates that it does not have.
     """
     path = checks.path("source", source)
     target = files.output_folder(folder) / path.with_suffix(f".{checks.choice('to', to, _FORMATS)}").name

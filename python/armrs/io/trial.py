@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..model import Model
 
 FEWEST_SAMPLES = 16
+"""A trial or a channel with fewer is refused."""
 BRIDGED = 0.05
 """A larger share of bridged samples is said."""
 SAME_RATE = 0.01

@@ -92,6 +92,10 @@ def sweep(
     command : str, optional
         What to say in the report.
 
+    Returns
+    -------
+    Swept
+
     Raises
     ------
     BadInput

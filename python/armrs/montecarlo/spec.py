@@ -119,6 +119,15 @@ class Sweep:
 def load_sweep(path: str | os.PathLike[str]) -> Sweep:
     """Read `SWEEP.toml` and what it names; see docs/files.md for its keys.
 
+    Parameters
+    ----------
+    path : path
+        `SWEEP.toml`.
+
+    Returns
+    -------
+    Sweep
+
     Raises
     ------
     BadInput

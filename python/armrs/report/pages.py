@@ -95,6 +95,11 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
     maker : str
         The verb that the page says it was made by: no other verb replaces it.
 
+    Returns
+    -------
+    Path
+        The file written.
+
     Raises
     ------
     BadInput

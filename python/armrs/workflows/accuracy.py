@@ -13,6 +13,7 @@ WARNED = 1e-3
 WRONG = 1e-2
 """Share from which a run is no result: exit status 1."""
 _ROUNDING = 1e-10
+"""Share of the largest energy below which an error is rounding."""
 
 
 class Piece(Protocol):

@@ -33,6 +33,7 @@ _LATE, _LATE_BY = 0.06, 2.0
 _LONG = 3.0
 """Length of a segment from which on its unit is asked for [m]."""
 _SAME_RATE = 0.02
+"""Relative difference of two sampling rates up to which they count as the same."""
 
 
 @dataclass(frozen=True)

@@ -199,6 +199,10 @@ def cohort(
     progress : callable, optional
         Called with the name of the stage and the share that is done, 0 to 1.
 
+    Returns
+    -------
+    Cohort
+
     Raises
     ------
     BadInput

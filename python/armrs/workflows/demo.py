@@ -204,6 +204,10 @@ def run_demo(
         For the report: how to repeat this.
     tell : callable
         Called with the name of the stage and the share of the stages that are done, 0 to 1.
+
+    Returns
+    -------
+    Demonstration
     """
     results_of: list[Demonstration] = []
 

@@ -16,7 +16,7 @@ from ..anthropometry import JOINTS, UNCERTAINTY, literature_arm, segments_of
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import tomlfile
-from ..model import AddedMass, Contact, Effect, Joint, Model, Robot, Subject, Tolerance, load_model
+from ..model import AddedMass, Contact, Joint, Model, Robot, Subject, Tolerance, load_model
 from .force_sensor import SixAxis
 from .interaction import PERIOD, Interaction, Perturbation, Support
 from .movement import Movement, movement_of
@@ -340,7 +340,8 @@ def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[M
             raise BadInput("believed", Text("a value without model"), "model as well; of a subject the literature is believed")
         truth, believed = _person(document, subject, own, seed)
     given = checks.tables("effect", document.get("effect", []))
-    truth = truth.replace(effects=(*truth.effects, *(Effect.from_dict(t, f"[[effect]] {k}") for k, t in enumerate(given, 1))))
+    added = Model.from_dict({**truth.to_dict(), "effect": given}).effects
+    truth = truth.replace(effects=(*truth.effects, *added))
     believed = believed.replace(robot=truth.robot, contact=truth.contact)
     truth = alter(truth)
     handle = checks.table("[handle]", document.get("handle", {}))
@@ -474,4 +475,4 @@ def _devices(value: object, truth: Model) -> Devices:
     return made
 
 
-__all__ = ["Controller", "Devices", "Effect", "Experiment", "Fault", "Run", "Safety", "experiment_of", "load_experiment"]
+__all__ = ["Controller", "Devices", "Experiment", "Fault", "Run", "Safety", "experiment_of", "load_experiment"]

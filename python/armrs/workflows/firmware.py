@@ -76,6 +76,10 @@ def export_c(
         `identified.json` of the model, for standard deviations and correlations. Without it standard deviations of the segments follow
         from `segment_uncertainty`, and effects count as exact.
 
+    Returns
+    -------
+    FirmwareSource
+
     Raises
     ------
     BadInput

@@ -253,10 +253,14 @@ def identify(
     cutoff : float, optional
         Cutoff of the common low-pass [Hz]; chosen from the data when absent.
     motion : {"auto", "measured", "simulated"}
-        Where the speeds and accelerations come from. "auto": simulated along the robot's path where it is known, with what measured
-        motion tells of the arm where the model as given moves elsewhere; measured, which is said in `warnings`, where that does too.
+        Where the speeds and accelerations come from. "auto": simulated along the robot's path where it is known. If the model as given
+        does not follow it, with the values that fit the measured motion; if these do not either, measured, with a line in `warnings`.
     level : float
         Probability of the intervals.
+
+    Returns
+    -------
+    Identified
 
     Raises
     ------
@@ -264,6 +268,12 @@ def identify(
         For an unknown effect or method, and data that cannot be used.
     IdentificationError
         When no solution exists.
+
+    Examples
+    --------
+    >>> result = armrs.identify("demo/data", with_effects=["coulomb"])  # doctest: +SKIP
+    >>> print(result.combinations[0])  # doctest: +SKIP
+    m1*l1 + a1*m2 = 0.7033 ± 0.0088 kg m
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     kinds = _checked(dataset, method, with_effects, cutoff, motion, level)
@@ -293,7 +303,7 @@ def _with_muscles(dataset: Dataset, effects: list[Effect], fitted: list[bool]) -
         if not recorded or (effect in dataset.model.all_effects and effect.joint not in recorded):
             found, allowed = (
                 Text(f"no muscle of joint {effect.joint}"),
-                f"an emg column that tells its activity: {effect.kind} depends on it",
+                f"an emg column with its activity: {effect.kind} depends on it",
             )
             raise BadInput("[[muscle]]", found, allowed, file=None if dataset.folder is None else dataset.folder / FILE)
     kept = [k for k, (effect, felt) in enumerate(zip(effects, feel, strict=True)) if not felt or effect.joint in recorded]
@@ -367,7 +377,7 @@ def _identified(built: _armrs.Rig, settings: CoreSettings, dataset: Dataset) -> 
     if not hand_meets_handle(dataset):
         raise IdentificationError(error)
     why = error.split(":")[0] if "differs from" in error else "the arm cannot be simulated"
-    return found, (f"speeds and accelerations are measured, not simulated: with what measured motion tells {why}",)
+    return found, (f"speeds and accelerations are measured, not simulated: {why}, also with the values that fit the measured motion",)
 
 
 _INERTIA_FELT = 1.0

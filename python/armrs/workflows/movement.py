@@ -66,6 +66,10 @@ def load_movement(path: str | os.PathLike[str], n_joints: int | None = None) -> 
     n_joints : int, optional
         Angles that each waypoint must have, where that is known; as many as the file has when absent.
 
+    Returns
+    -------
+    Movement
+
     Raises
     ------
     BadInput

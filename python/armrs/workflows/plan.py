@@ -225,7 +225,7 @@ def forecast(
     Parameters
     ----------
     model : Model
-        The arm as it is believed to be.
+        The assumed arm.
     movements : sequence of Movement
     repeats : int
         Trials of each movement.
@@ -233,6 +233,11 @@ def forecast(
         Kinds of joint effects that will be fitted at every joint besides those of the model, as for `identify`: when absent, elastic,
         viscous and coulomb in joints without a law.
     instruments : Instruments
+
+    Returns
+    -------
+    Plan
+        Its predictions: value and the standard deviation that `identify` will state.
 
     Raises
     ------
@@ -249,6 +254,14 @@ def forecast(
     1.03, which such numbers of repetitions tell to 5 and 7 % (`scripts/check_plan.py 200` and `100 300 3 601`). With three segments and
     five repeats two deviations of the hand's first moment are 2.1 % of it and of its second moment 4.9 %. With ten they are 1.5 and
     3.5 %: of 200 repetitions 95 % were within 1.6 and 3.5 %, and the scatter was 0.97 to 1.17 of the deviations.
+
+    Examples
+    --------
+    >>> import armrs, numpy as np
+    >>> from armrs.workflows.demo import true_model
+    >>> out = armrs.Movement(np.radians([[-60, 60], [-48, 60], [-60, 60]]), speed=0.5, acceleration=2.0)
+    >>> print(armrs.forecast(true_model(), [out]).predictions[0])
+    torque = 0.139 ± 0.0067 N m
     """
     asked = _Question(model, with_effects, instruments, repeats)
     movements = checks.instances("movements", movements, Movement)
@@ -283,7 +296,7 @@ def plan(
     Parameters
     ----------
     model : Model
-        The arm as it is believed to be. Its robot, where there is one, has to reach every place of the path.
+        The assumed arm. Its robot, where there is one, has to reach every place of the path.
     limits : Limits
         Of joints, speed, acceleration, the robot, force and duration.
     speeds : sequence of float
@@ -297,6 +310,10 @@ def plan(
         Movements that are tried.
     seed : int
         Of the search; the same seed proposes the same movements.
+
+    Returns
+    -------
+    Plan
 
     Raises
     ------

@@ -157,7 +157,7 @@ class Simulated(Doubted, Tabular, Series):
     columns : dict of str to ndarray
         Everything that was recorded: tip, handle, robot angles, every torque by itself, energies and works.
     readings : tuple of Readings
-        What the sensors read, one for each seed asked for.
+        What the sensors read, one for each seed.
     model : Model
     settings : dict
         Engine, integrator (of the native engine), step and rate that made it.
@@ -328,6 +328,10 @@ def simulate(
         Angles [rad] and speeds [rad/s] at the start. Where a handle leads: the static equilibrium near these angles.
     sensors, seeds
         What sensors read of the run, once for every seed.
+
+    Returns
+    -------
+    Simulated
 
     Raises
     ------

@@ -39,7 +39,7 @@ EDGE = 1.0
 """Periods of the cutoff at both ends of a trial that are not fitted: the low-pass knows one side of them only."""
 LEAST_SPEEDS = 1.5
 """The fastest stretch must be faster than the slowest by this factor before a reflex can be told from viscosity."""
-FELT = 0.1
+CATCH_SHARE = 0.1
 """Share of its largest moment in a stretch from which on the reflex counts as felt: the catch."""
 
 
@@ -194,6 +194,10 @@ def spasticity(
     progress : callable, optional
         Called with the name of the stage and the share that is done, 0 to 1.
 
+    Returns
+    -------
+    Spasticity
+
     Raises
     ------
     BadInput
@@ -296,7 +300,7 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
     span = slice(first, last + 1)
     parts = [fitted.direction * part[number][span] for part in (fitted.elastic, fitted.resisting, fitted.reflex)]
     moment = fitted.direction * (stretch.moment[span] - stretch.moment[first])
-    felt = parts[2] > FELT * parts[2].max(initial=0.0)
+    felt = parts[2] > CATCH_SHARE * parts[2].max(initial=0.0)
     shape = fitted.parameters
     begun = first + int(np.argmax(felt)) if fitted.found and felt.any() else None
     span_s = float(stretch.t[first]), float(stretch.t[last])

@@ -2,7 +2,7 @@ use super::law::{ActsOn, Info, Law, Local, Parameter, Parameters, Place, leading
 use super::prior::{Family, Part, Prior};
 use crate::{Scalar, Setup};
 
-/// The rotor of a drive, as felt at the joint: its inertia times the square of the gear ratio.
+/// The rotor of a drive, reflected to the joint: its inertia times the square of the gear ratio.
 ///
 /// It becomes part of the chain, so that forward and inverse dynamics hold it; as a torque it would be counted twice and
 /// is therefore none. Its gradient is that of inverse dynamics.

@@ -39,7 +39,7 @@ impl Place {
         }
     }
 
-    /// What an effect here has to be told besides its values: `"joint"` (for a segment its number), `"channel"` or nothing.
+    /// The key that an effect here needs besides its values: `"joint"` (for a segment its number), `"channel"` or nothing.
     pub const fn address(self) -> Option<&'static str> {
         match self {
             Self::Joint | Self::Segment | Self::AngleSensor => Some("joint"),

@@ -68,7 +68,7 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     /// Periods since a sample was last learned from; how often the state was not finite; what became of the last sample.
     age: u32,
     restarts: u32,
-    /// A restart that the next sample's status tells.
+    /// A restart that the status of the next sample reports.
     restarted: bool,
     last: SampleStatus,
     windows: Windows<T, N, P>,
@@ -96,7 +96,7 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
 }
 
 impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P, E> {
-    /// An estimator that knows its priors.
+    /// An estimator with its priors.
     ///
     /// # Errors
     /// [`Invalid`] for settings that are out of range, and priors without a positive standard deviation or with an empty

@@ -141,10 +141,10 @@ const LONGEST_GAP: f64 = 0.02;
 const SETTLING: f64 = 1.5;
 /// Rows in a period of the low-pass' cutoff. What it lets through changes so slowly that more would say the same again.
 const ROWS_PER_PERIOD: f64 = 20.0;
-/// Largest change in a period that is told from an infinite one.
+/// Largest change in a period that can be distinguished from an infinite one.
 const LARGEST: f64 = f32::MAX as f64;
 /// Share of its samples that a window needs.
-const ENOUGH: f64 = 0.5;
+const LEAST_SHARE: f64 = 0.5;
 /// Rows that a window has at least, where the sampling allows.
 const FEWEST_ROWS: u32 = 20;
 
@@ -204,7 +204,7 @@ impl<T: Real, const N: usize> Tuning<T, N> {
             window: length,
             stride,
             rows,
-            enough: periods(T::of(ENOUGH) * T::of_count(rows)).max(1),
+            enough: periods(T::of(LEAST_SHARE) * T::of_count(rows)).max(1),
             noise: s.noise,
             weight: s.noise.map(|noise| T::ONE / noise.squared()),
             dead_band: s.dead_band,

@@ -10,7 +10,7 @@ use crate::scalar::Real;
 const MEASURED: f64 = 0.9;
 /// Windows over which the size of the residual is averaged.
 const LONG: f64 = 100.0;
-/// Largest correlation between neighbouring windows that is believed.
+/// Largest correlation between neighbouring windows that is used.
 const MOST_CORRELATED: f64 = 0.9;
 
 impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P, E> {

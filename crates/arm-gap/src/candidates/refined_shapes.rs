@@ -60,6 +60,7 @@ fn limits<const N: usize>(
 
 /// Fastest mean speed of a joint over a quarter of a second \[rad/s\], which noise of the angles hardly changes.
 fn fastest<const N: usize>(session: &Session<N>, joint: usize) -> f64 {
+    /// \[s\]
     const SPAN: f64 = 0.25;
     let of_trial = |trial: &Trial<N>| {
         let apart = ((SPAN * trial.rate) as usize).max(1);

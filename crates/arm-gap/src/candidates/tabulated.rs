@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 use arm_core::effect::{Info, Local, MAX_PARAMETERS, OwnLaw, Parameters, Prior};
 
 /// Tables that are kept: a fit comes back to the shapes it has tried.
-const KEPT: usize = 24;
+const MOST_TABLES: usize = 24;
 
 /// Where a law is tabulated.
 ///
@@ -142,7 +142,7 @@ impl Tabulated {
         if let Some(known) = find(&kept) {
             return known;
         }
-        if kept.len() >= KEPT {
+        if kept.len() >= MOST_TABLES {
             kept.remove(0);
         }
         kept.push((key, Arc::clone(&tables)));

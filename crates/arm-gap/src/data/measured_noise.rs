@@ -127,7 +127,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
         /// Turns: noise says how far trials are shifted, and what is left without the shifts says what noise is.
-        const TURNS: usize = 3;
+        const ITERATIONS: usize = 3;
         let known: Vec<f64> = self
             .session
             .by_trial()
@@ -139,10 +139,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         let apart = self.session.compares_contact_torques();
         let of = |deviations: &[Thinned], taken: &[Thinned]| {
             let noise = Noise::of(deviations, taken, range, told)?;
-            Ok::<_, GapError>(if apart { noise.apart() } else { noise })
+            Ok::<_, GapError>(if apart { noise.uncorrelated() } else { noise })
         };
         let mut noise = of(deviations, fitted)?;
-        for _ in 0..TURNS {
+        for _ in 0..ITERATIONS {
             if known.is_empty() {
                 break;
             }

@@ -169,7 +169,7 @@ impl Noise {
     }
 
     /// The same as if channels did not vary together.
-    pub fn apart(self) -> Self {
+    pub fn uncorrelated(self) -> Self {
         let channels = self.whiteners.len();
         let mut correlation = vec![0.0; channels * channels];
         (0..channels).for_each(|a| correlation[a * (channels + 1)] = 1.0);

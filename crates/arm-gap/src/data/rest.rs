@@ -128,9 +128,9 @@ impl<const N: usize> PreparedSession<'_, N> {
 /// Joints in which something resists as much at a crawl as in motion.
 fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
     /// A speed at which a joint crawls \[rad/s\]: three times the default smoothing of dry laws, 0.01 rad/s, which are whole by then.
-    const CRAWL: f64 = 0.03;
+    const CREEP_SPEED: f64 = 0.03;
     /// A speed of motion \[rad/s\], ten times that of a crawl: a viscous torque is ten times as large there, a dry one the same.
-    const MOTION: f64 = 0.3;
+    const MOTION_SPEED: f64 = 0.3;
     let mut dry = [false; N];
     for effect in hypothesis.known.iter().chain(&hypothesis.named) {
         if effect.kind.info().place != Place::Joint || effect.index >= N {
@@ -145,7 +145,8 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
             };
             0.5 * (torque(speed) - torque(-speed))
         };
-        dry[effect.index] |= at(CRAWL) > 0.5 * at(MOTION).abs() && at(CRAWL) > 0.0;
+        dry[effect.index] |=
+            at(CREEP_SPEED) > 0.5 * at(MOTION_SPEED).abs() && at(CREEP_SPEED) > 0.0;
     }
     dry
 }

@@ -21,11 +21,11 @@ use crate::sensitivity::normal_equations::solve;
 /// Length of a run \[s\].
 const WINDOW: f64 = 2.0;
 /// Most steps of Gauss and Newton's method.
-const TURNS: usize = 8;
+const MOST_STEPS: usize = 8;
 /// Most halvings of a step.
 const HALVINGS: usize = 4;
 /// A step that lowers the cost by less than this share is the last.
-const ENOUGH: f64 = 1e-3;
+const LEAST_GAIN: f64 = 1e-3;
 /// Size of the residual that is always believed in \[rad\]: the last digit of an encoder.
 const LEAST: f64 = 1e-6;
 
@@ -79,7 +79,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let states = windows.iter().map(state).collect::<Option<Vec<_>>>()?;
         let mut swing = self.swung(&windows, fitted.hypothesis.clone(), states)?;
         let mut last = None;
-        for _ in 0..TURNS {
+        for _ in 0..MOST_STEPS {
             let pieces = self.pieces(&windows, &swing, &coordinates)?;
             let weights = self.weights(&windows, &swing)?;
             let step = self.step(&windows, &swing, (&coordinates, &pieces, &weights))?;
@@ -88,7 +88,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 break;
             };
             swing = next;
-            if gained < ENOUGH {
+            if gained < LEAST_GAIN {
                 break;
             }
         }

@@ -16,7 +16,7 @@ use crate::measurement_model::prediction::{Channels, Course, STEPS};
 /// How long a start is fitted to, and how long a driven arm runs \[s\].
 const SPAN: f64 = 1.0;
 /// Most steps of Gauss and Newton's method for a start.
-const TURNS: usize = 8;
+const MOST_STEPS: usize = 8;
 /// Shares of such a step that are tried until one brings the run nearer.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// A start is fitted to this part of its samples, one after the other.
@@ -116,7 +116,7 @@ impl<const N: usize> Session<N> {
                 .collect())
         };
         let mut residual = left(&state)?;
-        for _ in 0..TURNS {
+        for _ in 0..MOST_STEPS {
             let mut slopes = Matrix::zeros(N * count, 2 * N);
             for column in 0..2 * N {
                 let mut moved = state;

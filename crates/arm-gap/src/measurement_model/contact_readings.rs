@@ -55,7 +55,7 @@ impl<const N: usize> ContactReadings<N> {
     ///
     /// * `nominal`, `chain`, `setup` - the arm with which the channels were computed; the arm and the rig as a hypothesis has them
     /// * `misread` - what the angle sensors add \[rad\]
-    pub(super) fn told(
+    pub(super) fn missing_force(
         &self,
         (nominal, chain, setup, sensing): (
             &Chain<f64, N>,

@@ -23,7 +23,7 @@ use crate::trial_specific::component::SLOW;
 use crate::trial_specific::component::shapes_of;
 
 /// Times that channels are weighed anew by what is left of them.
-const TURNS: usize = 2;
+const REWEIGHTINGS: usize = 2;
 
 /// Whether an effect swings with a phase of its own in every trial: muscles do, and so does what shakes a robot fast.
 fn is_rhythm(effect: &Effect<f64>) -> bool {
@@ -85,7 +85,7 @@ impl<const N: usize> Session<N> {
         (own, mut rhythms): (&Hypothesis<N>, Vec<Effect<f64>>),
         course: &Arc<Course<N>>,
     ) -> Result<Vec<Effect<f64>>, SimulationError> {
-        for _ in 0..TURNS {
+        for _ in 0..REWEIGHTINGS {
             let mut swinging = own.clone();
             swinging.named.extend_from_slice(&rhythms);
             let Ok(trial) = ShownTrial::of(self, &swinging, course) else {
@@ -215,7 +215,7 @@ fn sizes<const N: usize>(
     let mut sizes = vec![0.0; columns.len()];
     // In a band as many samples are independent as it has room for.
     let share = f64::min(2.0 * course.band / course.rate, 1.0);
-    for _ in 0..TURNS {
+    for _ in 0..REWEIGHTINGS {
         let weights = weights(left, columns, &sizes, &course.counted);
         let weighed = |channels: &Channels| -> Vec<f64> {
             let each = std::iter::zip(channels, &weights);

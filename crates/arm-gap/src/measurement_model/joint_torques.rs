@@ -48,7 +48,7 @@ impl<const N: usize> Session<N> {
                 Some(contact) => {
                     let bend = motion.q[i] - true_motion(hypothesis, motion, i).0;
                     let rig = (&self.chain, &arm, &setup, &sensors);
-                    contact.told(rig, offset + bend, (i, time), torque)
+                    contact.missing_force(rig, offset + bend, (i, time), torque)
                 }
                 None => torque,
             };

@@ -28,7 +28,7 @@ pub(super) fn absorbed<'c, const N: usize>(
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Vec<Absorbed> {
     let modelled = model.all_effects();
-    let each = unknowns.filter_map(|c| told(&modelled, hypothesis, c));
+    let each = unknowns.filter_map(|c| absorbed_value(&modelled, hypothesis, c));
     each.collect()
 }
 
@@ -42,7 +42,7 @@ pub(super) fn stopped<'c, const N: usize>(
     let modelled = model.all_effects();
     let far = unknowns.filter(|c| c.is_at_limit(hypothesis.get(c.target)));
     let words: Vec<String> = far
-        .filter_map(|c| told(&modelled, hypothesis, c))
+        .filter_map(|c| absorbed_value(&modelled, hypothesis, c))
         .filter(|a| a.value.abs() > a.promised)
         .map(|a| {
             let (value, promised) = (in_unit(a.value, &a.unit), in_unit(a.promised, &a.unit));
@@ -67,7 +67,7 @@ fn in_unit(value: f64, unit: &str) -> String {
 }
 
 /// What was refitted of one unknown; `None` for what is each trial's own, or named.
-fn told<const N: usize>(
+fn absorbed_value<const N: usize>(
     modelled: &[Effect],
     hypothesis: &Hypothesis<N>,
     unknown: &Coordinate,

@@ -264,7 +264,7 @@ pub struct Screening {
     pub gap: Named<ChannelGap>,
     /// Lack of fit of the calibrated model.
     pub lack: Lack,
-    /// Every effect that was asked, alone and to first order, the likeliest first.
+    /// Every effect that was tested, alone and to first order, the likeliest first.
     pub suspects: Vec<Suspect>,
 }
 

@@ -6,7 +6,7 @@ use crate::candidates::candidate::Candidate;
 use crate::selection::first_order_screening;
 use crate::selection::search_state::{self, Ruled};
 
-/// An effect that was asked for and not named: the smallest that these data would have shown, and what it would explain.
+/// An effect that was tested and not named: the smallest size that these data would have shown, and what it would explain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Limit {
     /// Its kind.

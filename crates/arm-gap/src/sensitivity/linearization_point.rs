@@ -150,7 +150,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// The run of a hypothesis on the reference of each group.
     fn simulated(&self, hypothesis: &Hypothesis<N>) -> Result<Arc<SimulatedRuns<'a, N>>, GapError> {
         /// Hypotheses whose runs are kept.
-        const KEPT: usize = 6;
+        const MOST_RUNS: usize = 6;
         let has_rhythms =
             |line: &Linear<N>, trial: usize| line.course.rhythms == self.courses[trial].rhythms;
         let is_same = |other: &&Arc<SimulatedRuns<'a, N>>| {
@@ -174,7 +174,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             responses: Mutex::default(),
         });
         let mut kept = locked(&self.simulated);
-        kept.truncate(KEPT - 1);
+        kept.truncate(MOST_RUNS - 1);
         kept.insert(0, Arc::clone(&fresh));
         Ok(fresh)
     }

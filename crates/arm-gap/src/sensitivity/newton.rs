@@ -29,7 +29,7 @@ pub(super) fn newton<const N: usize>(
     nudge: f64,
 ) -> Option<Solved<N>> {
     /// Torque that may be missing, and that is missing at most where a step finds no better \[N m\].
-    const ENOUGH: (f64, f64) = (1e-7, 1e-3);
+    const TOLERANCES: (f64, f64) = (1e-7, 1e-3);
     /// Share of what is missing that a step of a good slope leaves at most.
     const GOOD: f64 = 0.3;
     /// Most rounds.
@@ -48,7 +48,7 @@ pub(super) fn newton<const N: usize>(
     let (mut at, (mut left, mut there)) = (start, missing(&start));
     let (mut inverse, mut fallback) = (*first, (first != second).then_some(second));
     for _ in 0..ROUNDS {
-        if size(&left) < ENOUGH.0 {
+        if size(&left) < TOLERANCES.0 {
             break;
         }
         let step = inverse * left;
@@ -91,7 +91,7 @@ pub(super) fn newton<const N: usize>(
         at,
         there,
         inverse,
-        exact: size(&left) < ENOUGH.1,
+        exact: size(&left) < TOLERANCES.1,
     })
 }
 
@@ -123,7 +123,7 @@ pub(super) fn slide<const N: usize>(
     /// Change of speed by which a slope is told \[rad/s\].
     const NUDGE: f64 = 1e-5;
     /// Torque that a further step answers where the solution is good enough, and at most where no step helps \[N m\].
-    const ENOUGH: (f64, f64) = (1e-7, 1e-3);
+    const TOLERANCES: (f64, f64) = (1e-7, 1e-3);
     /// Most rounds: six with the slope of the start and eight with one that is taken anew.
     const ROUNDS: usize = 14;
     /// Rounds after which the slope is taken anew, for a contact that opens and the end of a range.
@@ -154,7 +154,7 @@ pub(super) fn slide<const N: usize>(
         if !answered.is_finite() {
             return None;
         }
-        if answered < ENOUGH.0 {
+        if answered < TOLERANCES.0 {
             break;
         }
         at += change;
@@ -167,7 +167,7 @@ pub(super) fn slide<const N: usize>(
         at,
         there: now.there,
         slope,
-        exact: answered < ENOUGH.1,
+        exact: answered < TOLERANCES.1,
     })
 }
 

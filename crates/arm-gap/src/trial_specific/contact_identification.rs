@@ -19,11 +19,11 @@ use crate::sensitivity::normal_equations::Cluster;
 use crate::trial_specific::component::shapes_of;
 
 /// Most steps of Gauss and Newton's method.
-const TURNS: usize = 4;
+const MOST_STEPS: usize = 4;
 /// Shares of a step that are tried.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
 /// A step that lowers the cost by less than this share is the last.
-const ENOUGH: f64 = 1e-3;
+const CONVERGED: f64 = 1e-3;
 /// Powers of time with which the size of a rhythm may change over a trial.
 const SLOWLY: i32 = 3;
 
@@ -110,7 +110,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             .collect();
         let left = |h: &Hypothesis<N>| self.left_ringing(heard, h);
         let cost = |h: &Hypothesis<N>, left: &Left| dot(left, left) + departure(h, &coordinates);
-        for _ in 0..TURNS {
+        for _ in 0..MOST_STEPS {
             let before = cost(&best.hypothesis, &best.left);
             let steps = self.step_of(&best, &coordinates, &left)?;
             let shared = |share: f64| {
@@ -133,7 +133,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 break;
             };
             best = next;
-            if gained < ENOUGH * before {
+            if gained < CONVERGED * before {
                 break;
             }
         }

@@ -338,14 +338,14 @@ pub(super) fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[Vec<
     /// Nine of ten squares of a standard normal number are smaller.
     const NINE_OF_TEN: f64 = 2.706;
     /// How long a burst is felt around it, and a slip about its start \[s\].
-    const FELT: f64 = 1.0;
+    const RESPONSE_TIME: f64 = 1.0;
     let (start, duration) = one.timing();
     let long = duration.unwrap_or(0.0);
-    let own = (start - FELT, start + long);
+    let own = (start - RESPONSE_TIME, start + long);
     let elsewhere = asked.iter().filter(|other| {
         let (from, lasts) = other.timing();
         let same = other.place() == one.place() && lasts == duration;
-        same && (from - FELT > own.1 || from + long < own.0)
+        same && (from - RESPONSE_TIME > own.1 || from + long < own.0)
     });
     let mut squares: Vec<f64> = elsewhere
         .flat_map(|other| deviations.iter().map(|d| other.gain(d)))

@@ -16,9 +16,9 @@ const SLOWEST: f64 = 0.1;
 /// Turns of the phase over the longest trial that must be there: fewer are a drift.
 const LEAST_TURNS: f64 = 1.5;
 /// Turns of the phase, over the longest trial, between two frequencies that are asked.
-const TURNS: f64 = 0.7;
+const TURNS_BETWEEN: f64 = 0.7;
 /// Most frequencies that are asked: of trials so long that these are not enough a line in the spectrum tells as much.
-const MOST: usize = 120;
+const MOST_FREQUENCIES: usize = 120;
 /// [`UNSTEADY`] where joints have dry friction: a swing that turns them over changes what friction does, which no linear response knows.
 /// Movements have nothing else in common: what is no swing differs in most of its square.
 const UNSTEADY_IF_DRY: f64 = 0.3;
@@ -42,9 +42,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         let longest = |&t: &usize| self.courses[t].seen[0].len() as f64 / self.courses[t].rate;
         let longest = self.references.iter().map(longest).fold(1.0, f64::max);
         let slowest = f64::max(SLOWEST, LEAST_TURNS / longest);
-        let step = TURNS / longest;
+        let step = TURNS_BETWEEN / longest;
         let count = libm::ceil((SLOW - slowest) / step) as usize + 1;
-        if !self.repeated || count > MOST {
+        if !self.repeated || count > MOST_FREQUENCIES {
             return None;
         }
         let coarse: Vec<f64> = (0..count).map(|k| slowest + step * k as f64).collect();

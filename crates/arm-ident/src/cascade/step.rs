@@ -9,7 +9,7 @@ use arm_numerics::least_squares::program::{Program, Status};
 use arm_numerics::statistics::autoregressive::effective_samples;
 use arm_numerics::{Condenser, Factor};
 
-/// Fewest stretches of data in which a joint has rows; with fewer nothing tells how sure its values are.
+/// Fewest stretches of data in which a joint has rows; with fewer their scatter cannot be estimated.
 pub(super) const FEWEST: usize = 2;
 
 /// Residual, relative to the torques, assumed before the first fit.

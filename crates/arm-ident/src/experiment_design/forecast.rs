@@ -13,7 +13,7 @@ use crate::inference::summary::base_name;
 use crate::regression::instrument::Instrument;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
-use crate::regression::preprocessing::{Pieces, apart, filtered};
+use crate::regression::preprocessing::{Pieces, filtered, with_rest_columns};
 use crate::regression::sensitivity::{Course, parts};
 use crate::regression::trial::{Model, Tolerance, Trial};
 use crate::regression::unknown::{Source, Unknown, unknowns};
@@ -66,7 +66,7 @@ pub struct Task<const N: usize> {
 /// What is asked of the data.
 #[derive(Clone, Debug)]
 pub struct Question<const N: usize> {
-    /// The arm as it is believed to be, with the effects that are to be fitted at guessed values.
+    /// The assumed arm, with the effects that are to be fitted at guessed values.
     pub model: Model<N>,
     /// The robot that has to reach the path.
     pub robot: Option<Robot<f64>>,
@@ -85,7 +85,7 @@ pub struct Predicted {
     pub unit: &'static str,
     /// Index of the fitted effect, for its parameters.
     pub effect: Option<usize>,
-    /// Value believed.
+    /// Assumed value.
     pub value: f64,
     /// Standard deviation to be expected, with what is known beforehand.
     pub std: f64,
@@ -164,7 +164,7 @@ pub(crate) fn said<const N: usize>(
             let mut rows = Instrument::new((model, &unknowns), trial, (course, &motion), 0.0);
             let (cutoff, width) = (question.accuracy.cutoff, rows.building.width());
             let pieces = filtered(trial, cutoff, width, |count| rows.next(count))?;
-            Ok(apart(pieces, unknowns.len()))
+            Ok(with_rest_columns(pieces, unknowns.len()))
         })
         .collect::<Result<Vec<Pieces>, IdentError>>()?;
     let torque_noise: Vec<Vec<Covariance<N>>> = seen

@@ -16,7 +16,7 @@ pub struct Prediction {
     pub kind: String,
     /// Joint, from 1.
     pub joint: Option<usize>,
-    /// As it is believed before the experiment, in `unit`.
+    /// Value assumed before the experiment, in `unit`.
     pub value: f64,
     /// Standard deviation to be expected, with what is known beforehand, in `unit`.
     pub std: f64,

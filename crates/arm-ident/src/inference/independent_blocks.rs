@@ -1,4 +1,4 @@
-//! Stretches of data whose errors are independent: by their scatter it is told how certain an estimate is.
+//! Blocks of data whose errors are independent: their scatter gives the uncertainty of an estimate.
 
 use core::ops::Range;
 

@@ -12,7 +12,7 @@ use crate::regression::instrument::Instrument;
 use crate::regression::measured_motion::widened;
 use crate::regression::measured_motion::{candidates, measured, relative_speed_noise};
 use crate::regression::preprocessing::{
-    Noise, Pieces, apart, filtered, repeat_deviations, residual,
+    Noise, Pieces, filtered, repeat_deviations, residual, with_rest_columns,
 };
 use crate::regression::sensitivity::{HELD, damped};
 use crate::regression::simulated_motion::simulated;
@@ -462,7 +462,7 @@ fn prepare<const N: usize>(
             let motion = measured(trial, cutoff)?;
             let mut rows = Building::new((&model, unknowns), trial, &motion);
             let pieces = filtered(trial, cutoff, rows.width(), |count| rows.next(count))?;
-            return Ok(apart(pieces, unknowns.len()));
+            return Ok(with_rest_columns(pieces, unknowns.len()));
         }
         let course = simulated(&model, trial, cutoff).map_err(|error| error.in_trial(k))?;
         let motion = course.at_samples();
@@ -470,7 +470,7 @@ fn prepare<const N: usize>(
         let pieces = filtered(trial, cutoff, rows.building.width(), |count| {
             rows.next(count)
         })?;
-        Ok(apart(pieces, unknowns.len()))
+        Ok(with_rest_columns(pieces, unknowns.len()))
     };
     let prepared = parallel(threads, trials.len(), of_trial);
     prepared.into_iter().collect()

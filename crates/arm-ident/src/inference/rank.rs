@@ -29,7 +29,7 @@ pub struct RankOptions {
 pub struct Combination {
     /// The parameter that represents the group.
     pub base: usize,
-    /// The parameters that cannot be told from it, with coefficients.
+    /// The parameters that cannot be distinguished from it, with coefficients.
     pub others: Vec<(usize, f64)>,
 }
 

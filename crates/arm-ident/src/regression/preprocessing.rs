@@ -133,7 +133,7 @@ impl Thinning {
 }
 
 /// The same with what joints hold at rest, the column behind those of the unknowns, beside them.
-pub fn apart(mut pieces: Pieces, unknowns: usize) -> Pieces {
+pub fn with_rest_columns(mut pieces: Pieces, unknowns: usize) -> Pieces {
     for rows in &mut pieces {
         rows.held = (rows.columns.len() > unknowns)
             .then(|| rows.columns.pop())

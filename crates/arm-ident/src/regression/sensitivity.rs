@@ -22,7 +22,7 @@ pub(crate) const HELD: usize = 2;
 const FINE: f64 = 200.0;
 /// The model from which a fit starts: what the robot does not hold is damped so far that its own vibrations die out as fast as the rows end.
 ///
-/// A joint of which nobody knows how it is damped rings in a simulation for as long as it likes and in no phase with the truth; a fit that is
+/// A joint with unknown damping oscillates in a simulation with a wrong decay and phase; a fit that is
 /// linearised along such a run ends at a viscosity of zero once in ten times. Along a smooth run it finds back from ten times too much.
 pub(crate) fn damped<const N: usize>(model: &Model<N>, cutoff: f64) -> Model<N> {
     let stretched = inertia(&model.chain, &Pose::new(&Joints::zeros()));

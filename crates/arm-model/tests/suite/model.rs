@@ -226,6 +226,20 @@ fn the_same_model_with_one_parameter_changed() {
 }
 
 #[test]
+fn an_effect_may_name_its_joint() {
+    let named = MODEL.replace("joint = 2", "joint = \"elbow\"");
+    let read = Model::from_toml(&named).unwrap();
+    assert_eq!(read, model());
+    // Written, it is the number, which a renamed joint keeps.
+    assert_eq!(read.to_toml(), model().to_toml());
+    let twins = named.replace("name = \"shoulder\"", "name = \"elbow\"");
+    assert_eq!(
+        Model::from_toml(&twins).unwrap_err().to_string(),
+        "[[effect]] 1 (coulomb), joint: found 'elbow', allowed the number of the joint: several have this name"
+    );
+}
+
+#[test]
 fn parameters_that_are_not_there_are_refused() {
     let model = model();
     let refused = |text: &str, value: f64| model.with(id(text), value).unwrap_err().to_string();

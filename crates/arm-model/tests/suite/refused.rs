@@ -184,6 +184,11 @@ const BROKEN: &[(&str, &str, &str)] = &[
         "[[effect]] 1 (coulomb), joint: found 2.0, allowed a whole number >= 1",
     ),
     (
+        "joint = 2",
+        "joint = \"elbo\"",
+        "[[effect]] 1 (coulomb), joint: found unknown joint 'elbo', allowed elbow, shoulder (nearest known: elbow)",
+    ),
+    (
         "joint = 2\n",
         "",
         "[[effect]] 1 (coulomb), joint: found nothing, allowed the number of the joint or segment, from 1",

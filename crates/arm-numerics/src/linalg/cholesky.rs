@@ -2,7 +2,7 @@
 
 use crate::linalg::matrix::{Matrix, add_scaled, interleaved_dot};
 
-/// Columns closer to a combination of the others than this (squared sine of the angle) are not told apart.
+/// Columns closer to a combination of the others than this (squared sine of the angle) are not distinguished.
 const LEAST: f64 = 1e-9;
 
 /// `S A S = L Lᵀ` with a unit diagonal of `S A S`, so that units do not matter.

@@ -30,11 +30,11 @@ fn tapered(column: &[f64]) -> Vec<f64> {
 /// One Fourier coefficient of a tapered column.
 fn swing(tapered: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
     /// Samples over which a phase is turned on before it is computed anew: so many roundings add up.
-    const TURNS: usize = 32;
+    const SAMPLES_PER_SINCOS: usize = 32;
     let (sin, cos) = libm::sincos(TAU * frequency / rate);
     let mut sum = [0.0; 2];
-    for (chunk, values) in tapered.chunks(TURNS).enumerate() {
-        let phase = TAU * frequency * (chunk * TURNS) as f64 / rate;
+    for (chunk, values) in tapered.chunks(SAMPLES_PER_SINCOS).enumerate() {
+        let phase = TAU * frequency * (chunk * SAMPLES_PER_SINCOS) as f64 / rate;
         let (mut s, mut c) = libm::sincos(phase);
         for value in values {
             sum[0] += value * c;

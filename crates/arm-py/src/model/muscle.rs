@@ -6,7 +6,7 @@ use super::class::{built, table, value_class, wraps};
 
 type Any<'a, 'py> = &'a Bound<'py, PyAny>;
 
-/// A muscle whose activity a channel tells, and the joint that it moves.
+/// A muscle, the channel with its activity, and the joint that it moves.
 ///
 /// Parameters
 /// ----------

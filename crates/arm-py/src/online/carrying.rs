@@ -13,7 +13,7 @@ use crate::errors::{bad_input, invalid};
 use crate::firmware::{DeviceEquation, EFFECTS, UNKNOWNS, with_equation};
 use crate::rig::Rig;
 
-/// An arm of some length that tells the torque which carries it.
+/// An arm of some length, which gives the torque that carries it.
 pub trait Carries: Send {
     fn joints(&self) -> usize;
     /// Torques and standard deviations; None where a device would write none.

@@ -157,7 +157,7 @@ impl OnlineEstimator {
             }
         });
         let estimator = locked(&self.inner);
-        recorded.told(py, status, [estimator.joints(), estimator.used()])
+        recorded.into_dict(py, status, [estimator.joints(), estimator.used()])
     }
 
     /// Torques that carry the arm at rows of a motion, and their standard deviations; NaN where a device would give none.
@@ -229,7 +229,7 @@ impl Recorded {
         self.restarts.push(restarts);
     }
 
-    fn told(
+    fn into_dict(
         self,
         py: Python<'_>,
         status: Vec<u8>,

@@ -85,10 +85,10 @@ pub fn online_settings<'py>(
     period: f64,
     precision: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
-    with_equation!(rig, is_single(precision), equation => told(py, &equation, period))
+    with_equation!(rig, is_single(precision), equation => settings_dict(py, &equation, period))
 }
 
-fn told<'py, T: Real, const N: usize>(
+fn settings_dict<'py, T: Real, const N: usize>(
     py: Python<'py>,
     equation: &DeviceEquation<T, N>,
     period: f64,

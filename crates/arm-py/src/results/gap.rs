@@ -59,7 +59,7 @@ result_class! {
         why: String, "";
         /// How much worse it does, in units of twice the log-likelihood; a few units decide nothing.
         worse: f64, "";
-        /// Squared cosine between what the two would show on these movements: 1 cannot be told apart; NaN where it was not asked.
+        /// Squared cosine between what the two would show on these movements: 1 cannot be distinguished; NaN where it was not computed.
         likeness: f64, "";
         /// A movement that would tell the two apart, in words; its numbers are in `separation`.
         separating_movement: Option<String>, "", or None;
@@ -83,7 +83,7 @@ result_class! {
         channel: Option<String>, "";
         /// Its parameters by name, with signs as in the files.
         parameters: core::Named<core::Value>, "";
-        /// Probability of such a gain by chance, all questions that were asked counted.
+        /// Probability of such a gain by chance in any of the tests that were made.
         p_value: f64, "";
         /// Share of what can be explained that is lost without it.
         share: f64, "";
@@ -206,7 +206,7 @@ result_class! {
 }
 
 result_class! {
-    /// An effect that was asked for and not named: the smallest that these data would have shown, and what it would explain.
+    /// An effect that was tested and not named: the smallest size that these data would have shown, and what it would explain.
     Limit of core::Limit, in "armrs.workflows.gap" {
         /// Its kind.
         kind: String, "";

@@ -89,7 +89,7 @@ result_class! {
         places: Vec<core::Place>, "";
         /// The gap of each channel on the test trials.
         gap: core::Named<core::ChannelGap>, "";
-        /// What was asked for and not named.
+        /// What was tested and not named.
         would_have_seen: Vec<core::Limit>, "";
         /// Share of what the calibrated model left beyond noise that is still there.
         unexplained: f64, "";
@@ -139,7 +139,7 @@ result_class! {
         gap: core::Named<core::ChannelGap>, "";
         /// Lack of fit of the calibrated model, ratio and z; NaN without repeats.
         lack: Lack, "";
-        /// Every effect that was asked, alone and to first order, the likeliest first.
+        /// Every effect that was tested, alone and to first order, the likeliest first.
         suspects: Vec<core::Suspect>, "";
     }
 }

@@ -15,7 +15,7 @@ result_class! {
         kind: String, "";
         /// Joint, from 1.
         joint: Option<usize>, "";
-        /// As it is believed before the experiment, in `unit`.
+        /// Value assumed before the experiment, in `unit`.
         value: f64, "";
         /// Standard deviation to be expected, with what is known beforehand, in `unit`.
         std: f64, "";
@@ -120,7 +120,7 @@ result_class! {
 
 result_class! {
     /// The run that comes closest to a record.
-    RunFit of by_simulation::Fit, in "armrs.analysis.fitting" {
+    RunFit of by_simulation::Fit, in "armrs.workflows.fitting" {
         /// Value of each free parameter, in its unit.
         values: Vec<f64>, "";
         /// Its standard deviation where the noise is white and of the sizes given, as if no bound held; infinite where the record is silent.

@@ -2,6 +2,7 @@
 
 /// Trials by regula falsi; then by halves, which locate everything in 40 more.
 const BY_VALUES: usize = 20;
+/// Trials of both kinds.
 const TRIALS: usize = 60;
 /// How near a switch is located, as a fraction of the step.
 pub(super) const LOCATED: f64 = 1e-12;

@@ -108,7 +108,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         })
     }
 
-    /// Makes the step from `input` to `next`, and tells of its beginning.
+    /// Makes the step from `input` to `next`, and returns its beginning.
     ///
     /// # Errors
     /// The first joint whose state ceased to be finite.

@@ -16,6 +16,7 @@ _CLOCK = re.compile(
 
 Without hours only with a fraction."""
 _UNREADABLE = 0.1
+"""Largest share of cells without a time in a column of times."""
 _EMPTY = {"", "nan", "null", "none", "-", "--", "n/a"}
 
 

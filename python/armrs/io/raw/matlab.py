@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...errors import ArmrsError, Text
-from .. import apart
+from .. import reader_process
 from .matlab_arrays import HDF5
 from .table import NoTable, RawTable, column
 
@@ -39,7 +39,7 @@ def read_matlab(path: Path) -> list[RawTable]:
     if HDF5 in (head[:8], head[512:520]) and find_spec("h5py") is None:
         raise ArmrsError('HDF5 files and MATLAB files of version 7.3 need h5py: pip install "armrs[files]"')
     kind = "a MATLAB file of version 5 or 7.3" if path.suffix.lower() == ".mat" else "an HDF5 file"
-    with apart.content("armrs.io.raw.matlab_arrays", path, kind) as arrays:
+    with reader_process.content("armrs.io.raw.matlab_arrays", path, kind) as arrays:
         names, units = (json.loads(str(arrays[key])) for key in ("names", "units"))
         return [table_of(path, title, {name: arrays[place] for name, place in of.items()}, units) for title, of in names]
 

@@ -1,6 +1,6 @@
 """The numeric arrays of a MATLAB file (version 5, 7.3) or of another HDF5 file: `python -m armrs.io.raw.matlab_arrays FILE OUT.npz`.
 
-Damaged files crash both libraries, so that a process of its own reads them (`apart`).
+Damaged files crash both libraries, so that a process of its own reads them (`reader_process`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import apart
+from .. import reader_process
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _DEEPEST = 4
@@ -146,4 +146,4 @@ def _placed(path: Path, units: dict[str, str]) -> dict[str, np.ndarray]:
 
 
 if __name__ == "__main__":
-    apart.serve(arrays_of)
+    reader_process.serve(arrays_of)

@@ -34,7 +34,7 @@ def detectable(
     Parameters
     ----------
     model : Model
-        The arm as it is believed to be, with its robot.
+        The assumed arm, with its robot.
     movements : sequence of Movement
     repeats : int
         Trials of each movement, at least two: the noise is read off what they differ by, as `find_gap` does.

@@ -252,7 +252,7 @@ def first_look(suspects: Sequence[Suspect], joints: Sequence[str]) -> Drawn:
     ax.grid(visible=False, axis="y")
     ax.set_xlabel("explained, relative to what must be explained to be named")
     text = (
-        "Each effect alone and to first order, after calibration. Beyond the line it may be there; several that are may be one, "
-        "which `find_gap` tells."
+        "Each effect alone and to first order, after calibration. Beyond the line it may be missing. Several bars may have one cause; "
+        "`find_gap` tells them apart."
     )
     return Drawn("first-look", "What may be missing", text, figure)

@@ -77,7 +77,7 @@ class GapFound(Tabular, Series):
 
     @cached_property
     def would_have_seen(self) -> tuple[Limit, ...]:
-        """What was asked for and not named."""
+        """What was tested and not named."""
         return self.result.would_have_seen
 
     @property

@@ -34,13 +34,13 @@ def find_gap(
     ----------
     dataset : Dataset or path
     effects : sequence of OwnEffect
-        Kinds of one's own (`armrs.own_effect`) that are asked besides the catalogue.
+        User-defined kinds (`armrs.own_effect`) that are tested besides the catalogue.
     separate : bool
-        Whether movements are looked for that would tell a named effect from its alternatives.
+        Whether to look for movements that would distinguish a named effect from its alternatives.
     threads : int, optional
         All cores when absent; the result does not depend on it.
     progress : callable, optional
-        Told what is being done and how far it is, 0 to 1.
+        Called with the name of the stage and the share that is done, 0 to 1.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def find_gap(
     Raises
     ------
     BadInput
-        For data that cannot be judged: wrong units, swapped channels, a reversed force, trials that are copies.
+        For data that cannot be used: wrong units, swapped channels, a reversed force, trials that are copies.
     SimulationError
         When the model cannot be simulated on a trial, and neither can joint torques in measured motion be compared.
 
@@ -57,6 +57,12 @@ def find_gap(
     -----
     Where the simulated arm does not follow the measured one at all, as a free wrist may, joint torques in measured motion are compared
     instead; the first of the warnings says so.
+
+    Examples
+    --------
+    >>> import armrs
+    >>> armrs.find_gap("session").verdict  # doctest: +SKIP
+    'explained'
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     dataset = dataset.replace(trials=comparable(dataset.trials))
@@ -99,5 +105,5 @@ def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progres
 def _torques_instead(error: SimulationError) -> str:
     return (
         f"The simulated arm does not follow the measured one ({error}): joint torques in measured motion are compared instead of angles "
-        "and forces. Effects of the contact and of the robot cannot be asked that way."
+        "and forces. Effects of the contact and of the robot are not tested then."
     )

@@ -15,7 +15,9 @@ from .core_input import channel_names, core_settings, core_trials, is_led
 from .found import GapFound
 
 _BINS = 24
+"""Cells of an angle or a speed over which torques are averaged."""
 _FEWEST = 8
+"""Samples below which a cell has no mean; a trial needs more."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,7 +108,7 @@ class Calibrated:
     def plot(self) -> np.ndarray:
         """Draw what each effect alone would explain, the likeliest first; return the Axes."""
         if not self.suspects:
-            raise BadInput("plot", Text("no effect that was asked"), "one or more")
+            raise BadInput("plot", Text("no effect that was tested"), "one or more")
         return shown(lambda: figures.first_look(self.suspects, [j.name for j in self.dataset.model.joints]))
 
     def to_dict(self, command: str | None = None) -> dict[str, Any]:

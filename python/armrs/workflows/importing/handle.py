@@ -62,8 +62,9 @@ def robot_angles(robot: Robot, position: np.ndarray) -> np.ndarray:
     Examples
     --------
     >>> import armrs, numpy as np
+    >>> from armrs.io.plausibility import handle_path
     >>> robot = armrs.Robot((0.45, 0.45), (1.05, -0.10))
-    >>> q = np.array([[2.5, -1.2]])
+    >>> q = np.array([[2.5, 1.2]])
     >>> bool(np.allclose(robot_angles(robot, handle_path(robot, q)), q))
     True
     """

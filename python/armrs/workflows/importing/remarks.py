@@ -10,7 +10,7 @@ from ...io.raw import RawTable
 
 _SHOWN = 5
 """Remarks that a line holds at most."""
-_KEPT = 200
+_MOST_KEPT = 200
 """Remarks of a table that are kept at most: a column with more holds states."""
 
 
@@ -34,8 +34,8 @@ def _columns_of_words(table: RawTable) -> Iterator[str]:
         shown = [f"{text!r} in sample {sample}" for text, sample in sorted(first.items(), key=lambda item: item[1])]
         more = f" and {len(shown) - _SHOWN} more" if len(shown) > _SHOWN else ""
         yield f"{name}, a column of words, kept as remarks: {', '.join(shown[:_SHOWN])}{more}"
-    if len(table.remarks) > _KEPT:
-        yield f"only the first {_KEPT} of {len(table.remarks)} remarks are kept"
+    if len(table.remarks) > _MOST_KEPT:
+        yield f"only the first {_MOST_KEPT} of {len(table.remarks)} remarks are kept"
 
 
 def timed(table: RawTable, t: np.ndarray) -> tuple[str, ...]:
@@ -47,4 +47,4 @@ def timed(table: RawTable, t: np.ndarray) -> tuple[str, ...]:
     t : ndarray, shape (n_rows,)
         Time of its samples [s].
     """
-    return tuple(f"{t[remark.row]:.3f} s, {remark.column}: {remark.text}" for remark in table.remarks[:_KEPT])
+    return tuple(f"{t[remark.row]:.3f} s, {remark.column}: {remark.text}" for remark in table.remarks[:_MOST_KEPT])

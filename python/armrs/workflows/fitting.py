@@ -15,10 +15,10 @@ from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
 from ..tabular import Framed, Tidy
-from ..workflows.driven import CoreRun, driven
-from ..workflows.movement import Movement
-from ..workflows.simulate import DEFAULT_RATE
-from ..workflows.stiction import DEFAULT_DT
+from .driven import CoreRun, driven
+from .movement import Movement
+from .simulate import DEFAULT_RATE
+from .stiction import DEFAULT_DT
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +72,7 @@ def fit_by_simulation(
 ) -> SimulationFit:
     """Fit parameters of effects so that a simulated run comes closest to a recorded one.
 
-    The fit starts from the model's values, and again from elsewhere where a parameter ends at its bound or the rounds run out; the run that
-    comes closest counts. Every round simulates the estimate and a run beside it for each parameter in one batch.
+    The fit starts from the model's values, and from others where a parameter ends at a bound or the rounds run out. The closest run counts.
 
     Parameters
     ----------
@@ -85,12 +84,15 @@ def fit_by_simulation(
     force_on_arm : ndarray, shape (n, 2)
         Recorded contact force [N].
     free : sequence of str, or dict of str to (least, greatest)
-        Parameters as `"viscous1 viscosity"`: kind and joint of an effect that the model has, and its parameter. Their bounds, or
-        those of the catalogue.
+        Parameters as `"viscous1 viscosity"`: kind and joint of an effect of the model, and its parameter. Bounds, or the catalogue's.
     angle_noise, force_noise : float
         Standard deviations of the noise, which weigh angles against forces [rad, N].
     integrator, dt, rate
         As in `simulate`.
+
+    Returns
+    -------
+    SimulationFit
 
     Raises
     ------
