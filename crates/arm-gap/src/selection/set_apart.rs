@@ -10,6 +10,7 @@ use crate::data::session::ComparisonMode;
 use crate::measurement_model::prediction::Course;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::search_state::{Progress, SearchState, Settled};
+use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{SLOW, TrialSpecific};
 use crate::trial_specific::disturbance::is_held;
 use crate::trial_specific::tremor_detection::Line;
@@ -48,7 +49,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             apart.trial_specific.push(found);
             settled = self.calibrate_anew()?;
         }
-        self.disturbances(settled, &mut apart.trial_specific)
+        self.disturbances(settled, &mut apart.trial_specific, &[])
     }
 
     /// Asks for a rhythm once more when something was named: what rang may have been that; that may have hidden a rhythm; and how an
@@ -157,10 +158,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             return Ok(state);
         }
         self.take_back();
-        found.retain(|a| a.trial.is_none());
+        let known: Vec<_> = found.extract_if(.., |a| a.trial.is_some()).collect();
         self.measure_noise(&self.linearize(&state.current.hypothesis)?)?;
         let settled = self.settle(state.current.hypothesis, state.current.asked)?;
-        let settled = self.disturbances(settled, found)?;
+        let settled = self.disturbances(settled, found, &known)?;
         let from;
         (state.calibrated, from) = self.settle(state.calibrated.hypothesis, Vec::new())?;
         state.before = lack_of_fit(self, &from, &state.calibrated);
@@ -168,16 +169,18 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(state)
     }
 
-    /// Leaves out of single trials what disturbs them, the clearest first. Whole trials tell: what disturbs one while a joint with dry
-    /// friction rests, repeats differ by there.
+    /// Leaves out of single trials what disturbs them, the clearest first.
+    ///
+    /// * `known` - what was found before dry friction was named: whole trials show it too where it happened while a joint rests
     fn disturbances(
         &mut self,
         (mut fitted, mut point): Settled<'a, N>,
         trial_specific: &mut Vec<TrialSpecific>,
+        known: &[TrialSpecific],
     ) -> Result<Settled<'a, N>, GapError> {
         let most = trial_specific.len() + DISTURBANCES;
         while trial_specific.len() < most
-            && let Some(one) = self.over_whole_trials(|whole| whole.disturbance(&point, 1.0))
+            && let Some(one) = self.next_disturbance(&point, known)
             && let Some(trial) = one.trial
         {
             self.leave_out(trial, one.span());
@@ -186,5 +189,18 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             (fitted, point) = self.settle(fitted.hypothesis, fitted.asked)?;
         }
         Ok((fitted, point))
+    }
+
+    fn next_disturbance(
+        &mut self,
+        point: &LinearizationPoint<N>,
+        known: &[TrialSpecific],
+    ) -> Option<TrialSpecific> {
+        let moving = self.disturbance(point, 1.0);
+        if moving.is_some() || known.is_empty() {
+            return moving;
+        }
+        let found = self.over_whole_trials(|whole| whole.disturbance(point, 1.0));
+        found.filter(|one| known.iter().any(|before| before.is_same_event(one)))
     }
 }

@@ -66,6 +66,15 @@ impl TrialSpecific {
         rhythms && (self.wave()[0] - other.wave()[0]).abs() < NEAR
     }
 
+    /// Whether another happened to the same thing in the same trial, and at about the same time.
+    pub fn is_same_event(&self, other: &Self) -> bool {
+        /// Difference of two starts that are one \[s\].
+        const NEAR: f64 = 0.5;
+        let (a, b) = (&self.effect, &other.effect);
+        let same = a.kind == b.kind && a.index == b.index && self.trial == other.trial;
+        same && self.trial.is_some() && (self.span().0 - other.span().0).abs() < NEAR
+    }
+
     /// From when to when it lasts \[s\].
     pub fn span(&self) -> (f64, f64) {
         let p = &self.effect.parameters;
@@ -168,5 +177,23 @@ mod tests {
         let of_the_handle = Kind::named("handle_slip").expect("known");
         one.effect = Effect::new(of_the_handle, 0).with(&[0.002, 0.001, 4.0]);
         assert_eq!(one.span(), (4.0, f64::INFINITY));
+    }
+
+    #[test]
+    fn one_event_is_in_one_trial_in_one_place_and_at_one_time() {
+        let burst = |joint: usize, start: f64, trial: Option<usize>| {
+            let kind = Kind::named("voluntary").expect("known");
+            let mut one = rhythm(kind, 0.0, trial);
+            one.effect = Effect::new(kind, joint).with(&[0.3, start, 0.6]);
+            one
+        };
+        let first = burst(1, 4.0, Some(2));
+        assert!(first.is_same_event(&burst(1, 4.4, Some(2))));
+        let others = [
+            burst(1, 4.6, Some(2)),
+            burst(0, 4.0, Some(2)),
+            burst(1, 4.0, Some(3)),
+        ];
+        assert!(others.iter().all(|other| !first.is_same_event(other)));
     }
 }
