@@ -200,7 +200,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if moving.is_some() || known.is_empty() {
             return moving;
         }
-        let found = self.over_whole_trials(|whole| whole.disturbance(point, 1.0));
+        // Other trials may have samples then.
+        let found = self.over_whole_trials(|whole| {
+            let whole_point = whole.linearize(&point.hypothesis).ok()?;
+            whole.disturbance(&whole_point, 1.0)
+        });
         found.filter(|one| known.iter().any(|before| before.is_same_event(one)))
     }
 }
