@@ -114,7 +114,7 @@ def test_a_difference_between_groups_has_a_direction() -> None:
     """The page of a cohort said that they differ, once for the groups and once for the sides."""
 
     def contrast(first: str, second: str, difference: float, p_value: float) -> dict[str, Any]:
-        return {"name": "half_width in slow", "between": [first, second], "difference": difference, "p_value": p_value}
+        return {"name": "half_width in slow", "between": [first, second], "within": "", "difference": difference, "p_value": p_value}
 
     found = {"verb": "cohort", "subjects": 12, "sessions": 24, "quantities": [{"name": "half_width in slow"}]}
     found["contrasts"] = [contrast("control", "patient", 0.6, 1e-4), contrast("left", "right", -0.2, 0.01), contrast("a", "b", 1.0, 0.2)]
