@@ -69,6 +69,9 @@ def test_of_two_amplitudes_the_larger_one_is_told() -> None:
     )
     heave |= {"summary": "first joint that heaves", "formula": "f", "p_value": 1e-20}
     assert "z -0.0030 m (95 % interval -0.0032 to -0.0028)" in named(result("explained", heave))[0]
+    # As its interval, the probability of an improvement by chance assumes that the structure of the model is right.
+    assert "by chance: below one in a million" in named(result("explained", heave))[0]
+    assert "by chance" not in named(result("unexplained", heave))[0]
 
 
 def test_an_open_gap_contradicts_no_sentence() -> None:

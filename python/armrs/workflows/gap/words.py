@@ -38,10 +38,10 @@ def chance(effect: Mapping[str, Any]) -> str:
 
 def named(result: Mapping[str, Any]) -> list[str]:
     """Return the named effects, a line each: what it is, its formula, its size, and how likely it is by chance."""
-    joints = result["data"]["joints"]
+    joints, sure = result["data"]["joints"], result["verdict"] != "unexplained"  # as intervals, the probability assumes the structure
     return [
-        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}. "
-        f"Probability of such an improvement of the fit by chance: {chance(e)}."
+        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}."
+        + (f" Probability of such an improvement of the fit by chance: {chance(e)}." if sure else "")
         for e in headline.by_joint(result)
     ]
 
@@ -261,7 +261,8 @@ def intervals(data: Mapping[str, Any]) -> str:
     """Return under which condition the intervals hold, or why there are none."""
     if data["verdict"] == "unexplained":
         return (
-            "No intervals are given: they assume that the structure of the model is right, but something is left that no effect explains."
+            "No intervals are given, and no probabilities: they assume that the structure of the model is right, but something is left "
+            "that no effect explains."
         )
     return "± is one standard deviation. Interval and ± hold if the structure of the model is right."
 
