@@ -379,7 +379,7 @@ def test_resampling_reproduces_parabolas(session: Session) -> None:
 def test_a_stated_rate_that_the_stamps_do_not_show_is_reported(session: Session) -> None:
     session.edit("dataset.toml", "= 50.0", "= 100")
     data = armrs.load_dataset(session.folder)
-    assert "trials/slow_1.csv: time stamps give 50 Hz, sample_rate says 100 Hz: the time stamps are used" in data.warnings
+    assert "trials/slow_1.csv and 1 more: time stamps give 50 Hz, sample_rate says 100 Hz: the time stamps are used" in data.warnings
 
 
 def test_short_gaps_are_bridged_and_marked(session: Session) -> None:
@@ -477,6 +477,15 @@ def test_whole_turns_are_taken_out(session: Session) -> None:
     data = armrs.load_dataset(session.folder)
     np.testing.assert_allclose(data.trials[0].q[:, 0], smooth, atol=1e-11)
     assert data.warnings == ("trials/slow_1.csv: column q1_rad jumps by whole turns once: they were taken out",)
+
+
+def test_a_warning_of_several_trials_is_one_line(session: Session) -> None:
+    values = rows(200)
+    values[:, 1] = np.round((np.linspace(2.0, 5.0, 200) + np.pi) % (2 * np.pi) - np.pi, 12)
+    write_rows(session, values)
+    (session.folder / "trials/slow_2.csv").write_text((session.folder / "trials/slow_1.csv").read_text())
+    data = armrs.load_dataset(session.folder)
+    assert data.warnings == ("trials/slow_1.csv and 1 more: column q1_rad jumps by whole turns once: they were taken out",)
 
 
 def test_seconds_since_1970_are_welcome(session: Session) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
+from armrs.cli.analysis import after_gap
 from armrs.workflows.gap.headline import amount, headline, still_open
 from armrs.workflows.gap.summary import marks, rivals
 from armrs.workflows.gap.words import calibration, gap, heading, intervals, left, missing, named, nearest, others, tie
@@ -67,6 +69,9 @@ def test_of_two_amplitudes_the_larger_one_is_told() -> None:
     )
     heave |= {"summary": "first joint that heaves", "formula": "f", "p_value": 1e-20}
     assert "z -0.0030 m (95 % interval -0.0032 to -0.0028)" in named(result("explained", heave))[0]
+    # As its interval, the probability of an improvement by chance assumes that the structure of the model is right.
+    assert "by chance: below one in a million" in named(result("explained", heave))[0]
+    assert "by chance" not in named(result("unexplained", heave))[0]
 
 
 def test_an_open_gap_contradicts_no_sentence() -> None:
@@ -79,7 +84,23 @@ def test_an_open_gap_contradicts_no_sentence() -> None:
         assert "Nothing is missing" not in said and "falls from" not in said
         assert "off by 0.88° RMS; repeats differ by 0.11°" in said
         assert [row[-1] for row in gap(told).rows] == ["open", "open"]
-        assert any("the angle of joint 3 (q3) is open on the test trials" in line for line in left(told))
+        assert any(line.startswith("The angle of joint 3 (q3) is open on the test trials") for line in left(told))
+
+
+def test_the_next_step_speaks_of_an_open_gap_only_where_a_channel_is_open() -> None:
+    """A lack of fit alone makes a result unexplained: no channel of its report was open."""
+    step = after_gap(result("unexplained", DRY, open=[]), Path("s"), Path("out"))
+    assert step == "out/report.html shows where model and data disagree; armrs check s lists problems of the recordings"
+    assert "in which channel the gap is open" in after_gap(result("unexplained", open=[{"channel": "q3_rad"}]), Path("s"), Path("out"))
+
+
+def test_parameters_that_a_law_does_without_have_no_row() -> None:
+    """Under `unexplained` nothing has an interval, and a reflex had rows for a direction, a tonic angle and a slope of zero."""
+    reflex = effect("stretch_reflex", 3)
+    reflex |= {"share": 0.1, "without": None}
+    values = (("gain", 0.087, "N m s/rad"), ("threshold", 0.31, "rad/s"), ("direction", 0.0, "1"), ("slope", 0.0, "1/s"))
+    reflex["parameters"] = {name: {"value": value, "std": None, "unit": unit, "interval": None} for name, value, unit in values}
+    assert [row[3] for row in missing(result("unexplained", reflex)).rows] == ["gain", "threshold"]
 
 
 def test_the_sketch_says_where_a_rival_acts_that_acts_elsewhere() -> None:
@@ -293,6 +314,10 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     assert lines[1].endswith("40 standard deviations apart (now 13, which the error of the named law may cause).")
     assert "or by no more than the possible error of the named law: on these" in tie(result("explained", {**DRY, "alternatives": [far]}))
     assert "log-likelihood: on these" in tie(result("explained", {**DRY, "alternatives": [rival]}))
+    rare = effect("stretch_reflex", 2, why="explains these movements better, but few joints have it", worse=-60.4)
+    assert tie(result("explained", {**DRY, "alternatives": [rival, rare]})).endswith(
+        "One that explains them better is not named, because few joints have it."
+    )
     for worse, said in ((-729.0, "(why, by 729 units more)."), (-3.0, "(why)."), (0.05, "(why).")):
         other = effect("viscous", 2, why="why", worse=worse)
         [line] = others(result("explained", {**DRY, "alternatives": [other]}))

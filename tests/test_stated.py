@@ -327,7 +327,8 @@ def test_what_can_change_together_has_units() -> None:
 
 def test_a_weight_says_what_its_deviations_count() -> None:
     """`0.46 ± 0.01 times the masses, 5.4 standard deviations from it`: the ± is not that of the model."""
-    assert "0.46 ± 0.01 times the masses" in (said := str(setup.Weight(0.46, 0.01, 5.4)))
+    assert "0.460 ± 0.010 times the masses" in (said := str(setup.Weight(0.46, 0.01, 5.4)))
+    assert "0.1068 ± 0.0031 times the masses" in str(setup.Weight(0.1068, 0.0031, 8.9))  # it read 0.11 ± 0.00
     assert "5.4 standard deviations from one, the model's own uncertainty counted" in said
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import enum
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -175,16 +175,18 @@ def gap(
     with kept(history, result, day, plain):
         written = write_gap(result, plain, folder) if folder else []
         console.warn([*data.warnings, *result.warnings])
-        step = _after_gap(result.verdict, dataset, folder)
+        step = after_gap(plain, dataset, folder)
         present(lambda: plain, json, lambda: words.show(plain, written), step)
     return 1 if result.verdict == "unexplained" else 0
 
 
-def _after_gap(verdict: str, dataset: Path, folder: Path | None) -> str:
+def after_gap(result: Mapping[str, Any], dataset: Path, folder: Path | None) -> str:
+    """Return the next step after a search."""
     if folder is None:
         return f"armrs gap {quoted(dataset)} -o gap writes a report with figures, and the amended model"
-    if verdict == "unexplained":
-        return f"{folder / 'report.html'} shows when and in which channel the gap is open; armrs check {quoted(dataset)} checks the sensors"
+    if result["verdict"] == "unexplained":
+        shown = "when and in which channel the gap is open" if result["open"] else "where model and data disagree"
+        return f"{folder / 'report.html'} shows {shown}; armrs check {quoted(dataset)} lists problems of the recordings"
     return f"armrs report {quoted(folder / 'gap.json')} --summary -o clinic writes one page in plain words"
 
 

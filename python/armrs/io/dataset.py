@@ -234,6 +234,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         _on(model, item, f"[[added]] {number}", path)
     trials: list[Trial] = []
     warnings = list(model.warnings)
+    alike: dict[str, list[str]] = {}
     if model_path is None:
         warnings.append(NO_MODEL)
     for entry in description.trials:
@@ -243,7 +244,9 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
             warnings.append(left_out(entry))
             continue
         trials.append(reading.trial)
-        warnings += [f"{entry.file}: {line}" for line in reading.warnings]
+        for line in reading.warnings:
+            alike.setdefault(line, []).append(entry.file)
+    warnings += [f"{first}{f' and {len(more)} more' if more else ''}: {line}" for line, (first, *more) in alike.items()]
     marked, lines = mark_activity(trials)
     try:
         marked, relative = joint_activity(marked, description.muscles, model.n_joints)

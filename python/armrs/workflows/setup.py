@@ -16,6 +16,7 @@ from ..io.plausibility import OTHER_ZERO, hand_meets_handle
 from ..io.readings import Reading
 from ..io.trial import Trial, constant
 from ..model import Model
+from ..report.tables import plus_minus
 
 _UNEXPLAINED = 0.04
 """Share of the contact torques that gravity and passive joints leave, from which on another reading is looked for."""
@@ -162,7 +163,8 @@ class Weight:
     apart: float
 
     def __str__(self) -> str:
-        found = f"the movements ask for {self.factor:.2f} ± {self.std:.2f} times the masses and first moments of the model, in all segments"
+        factor = plus_minus(self.factor, self.std)
+        found = f"the movements ask for {factor} times the masses and first moments of the model, in all segments"
         units = [
             f"forces stated in {wrong} that are {right}"
             for unit, newtons in _UNITS.items()

@@ -184,9 +184,10 @@ def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
     text = ""
     if seen.torque is not None:
         _law(axes.pop(0), seen, seen.torque)
+        band = ", with the 95 % interval of its size (band)" if np.any(seen.high > seen.low) else ""
         text = (
-            f"Left, its torque against the {seen.against} along the fit trials, with the 95 % interval of its size (band), and what was "
-            "measured beyond everything else (grey: mean and scatter of trials). "
+            f"Left, its torque against the {seen.against} along the fit trials{band}, and what was measured beyond everything else "
+            "(grey: mean and scatter of trials). "
         )
     for unit in dict.fromkeys(names[c].rsplit("_", 1)[1] for c in changed):
         ax = axes.pop(0)

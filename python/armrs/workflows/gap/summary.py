@@ -36,7 +36,9 @@ def summary(result: GapFound) -> Drawn:
     figure = plotting.figure(10.6, max(3.9, 0.34 * len(gaps) + 1.7, 0.3 * min(named, _LINES) + 1.5))
     left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.0, 1.05)})
     drawn_arm(result, left)
-    text = "Left, the arm in the middle of its movements, with the named effects where they act; ± is one standard deviation."
+    text = "Left, the arm in the middle of its movements, with the named effects where they act"
+    sized = any(parameter.std is not None for effect in result.effects for parameter in effect.parameters.values())
+    text += "; ± is one standard deviation." if sized else "."
     if not named:
         text = "Left, the arm in the middle of its movements; no effect was named."
     if gaps:

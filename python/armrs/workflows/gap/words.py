@@ -38,10 +38,10 @@ def chance(effect: Mapping[str, Any]) -> str:
 
 def named(result: Mapping[str, Any]) -> list[str]:
     """Return the named effects, a line each: what it is, its formula, its size, and how likely it is by chance."""
-    joints = result["data"]["joints"]
+    joints, sure = result["data"]["joints"], result["verdict"] != "unexplained"  # as intervals, the probability assumes the structure
     return [
-        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}. "
-        f"Probability of such an improvement of the fit by chance: {chance(e)}."
+        f"{effect_name(e, joints)}: {e['summary']}. {e['formula']}. {size(e)}."
+        + (f" Probability of such an improvement of the fit by chance: {chance(e)}." if sure else "")
         for e in headline.by_joint(result)
     ]
 
@@ -101,11 +101,12 @@ def others(result: Mapping[str, Any]) -> list[str]:
 
 def tie(result: Mapping[str, Any]) -> str:
     """Return by how much alternatives may explain the data less and still not be told apart."""
-    worse = any((a.get("worse") or 0.0) > _BETTER for effect in result["effects"] for a in effect["alternatives"])
-    beyond = ", or by no more than the possible error of the named law" if worse else ""
+    worse = [a.get("worse") or 0.0 for effect in result["effects"] for a in effect["alternatives"]]
+    beyond = ", or by no more than the possible error of the named law" if max(worse, default=0.0) > _BETTER else ""
+    rare = " One that explains them better is not named, because few joints have it." if min(worse, default=0.0) < -_BETTER else ""
     return (
         f"These explain the data as well, or less by up to {_BETTER:.0f} units of twice the log-likelihood{beyond}: on these movements "
-        "they cannot be told apart."
+        f"they cannot be told apart.{rare}"
     )
 
 
@@ -159,10 +160,8 @@ def left(result: Mapping[str, Any]) -> list[str]:
     for name in headline.still_open(result):
         channel = result["gap"][name]
         off, floor = (headline.amount(name, value) for value in (headline.left(channel), channel["floor"]))
-        lines.append(
-            f"{headline.spoken(name.rsplit('_', 1)[0])} is open on the test trials: off by {off} RMS{headline.place(result, name)}; "
-            f"repeats differ by {floor}."
-        )
+        what, place = headline.spoken(name.rsplit("_", 1)[0]), headline.place(result, name)
+        lines.append(f"{what[0].upper()}{what[1:]} is open on the test trials: off by {off} RMS{place}; repeats differ by {floor}.")
     if result["unexplained"]["share"]:
         lines.append(
             f"Of the calibrated model's residual beyond noise on the fit trials, {tables.percent(result['unexplained']['share'])} remains."
@@ -182,8 +181,8 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what the workflow found."""
     common.head(result, verdict(result))
     common.show(heading(result), missing(result))
-    for line in (*others(result), *apart(result)):
-        print(line)
+    if lines := [*others(result), *apart(result)]:
+        print("\n".join(lines) + "\n")
     common.show("Gap on the test trials: root mean square of simulated minus measured", gap(result))
     if result["gap"]:
         print(f"{symbols(result)}\n")
@@ -245,7 +244,8 @@ def missing(data: Mapping[str, Any]) -> Table:
             without = effect.get("without")
             alone = "–" if without is None else digits(without, 2)
         fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
-        for k, (name, value) in enumerate((fitted or effect["parameters"]).items()):
+        used = {n: v for n, v in effect["parameters"].items() if v["value"]}  # a parameter of zero is one that the law does without
+        for k, (name, value) in enumerate((fitted or used or effect["parameters"]).items()):
             head = [effect["kind"], place, alone] if k == 0 else ["", "", ""]
             factor, held_in = tables.read_in(value["unit"])
             std = value["std"] and factor * value["std"]
@@ -261,7 +261,8 @@ def intervals(data: Mapping[str, Any]) -> str:
     """Return under which condition the intervals hold, or why there are none."""
     if data["verdict"] == "unexplained":
         return (
-            "No intervals are given: they assume that the structure of the model is right, but something is left that no effect explains."
+            "No intervals are given, and no probabilities: they assume that the structure of the model is right, but something is left "
+            "that no effect explains."
         )
     return "± is one standard deviation. Interval and ± hold if the structure of the model is right."
 
