@@ -175,7 +175,9 @@ def test_one_line_says_in_which_trials_muscles_are_active_and_for_how_long() -> 
         active[10 : 10 + samples] = True
     marked, lines = _applied(quiet, times, [])
     least, most = (f"{n * quiet[0].dt:.2g}" for n in (20, 60))
-    assert lines == [f"{quiet[0].file} and {quiet[1].file}: muscles are active for {least} to {most} s; only spasticity uses these samples"]
+    assert lines == [
+        f"{quiet[0].file} and {quiet[1].file}: muscles are active for {least} to {most} s; analyses of a passive arm leave these samples out"
+    ]
     assert [int((~trial.valid).sum()) for trial in marked] == [20, 60, 0]
 
 

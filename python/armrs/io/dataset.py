@@ -246,7 +246,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         trials.append(reading.trial)
         for line in reading.warnings:
             alike.setdefault(line, []).append(entry.file)
-    warnings += [f"{first}{f' and {len(more)} more' if more else ''}: {line}" for line, (first, *more) in alike.items()]
+    warnings += [f"{files.first_of(those)}: {line}" for line, those in alike.items()]
     marked, lines = mark_activity(trials)
     try:
         marked, relative = joint_activity(marked, description.muscles, model.n_joints)

@@ -9,7 +9,7 @@ import shutil
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
@@ -46,6 +46,11 @@ def with_articles(kinds: Iterable[type]) -> list[str]:
 
 _path = path
 """For functions with an argument of that name."""
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first of some files, and how many more there are."""
+    return f"{names[0]} and {len(names) - 1} more" if len(names) > 1 else names[0]
 
 
 @contextmanager

@@ -72,16 +72,17 @@ def _applied(trials: Sequence[Trial], active: list[np.ndarray], lines: list[str]
     for trial, own in zip(trials, active, strict=True):
         own = own & trial.valid
         valid = trial.valid & ~own
-        if own.any() and not valid.any():
+        throughout = own.any() and not valid.any()
+        if throughout:
             lines.append(f"{trial.file}: muscles are active throughout; this is no passive recording")
         elif own.any():
             seconds[trial.file] = float(own.sum()) * trial.dt
         # A trial that is active throughout is compared as a whole; the line above says what it is.
-        marked.append(dataclasses.replace(trial, active=own, valid=valid if valid.any() else trial.valid))
-    return tuple(marked), lines + _left_out(seconds)
+        marked.append(dataclasses.replace(trial, active=own, valid=trial.valid if throughout else valid))
+    return tuple(marked), lines + _activity_line(seconds)
 
 
-def _left_out(seconds: dict[str, float]) -> list[str]:
+def _activity_line(seconds: dict[str, float]) -> list[str]:
     """Say in one line in which trials, and for how long [s], muscles are active."""
     if not seconds:
         return []
@@ -89,7 +90,7 @@ def _left_out(seconds: dict[str, float]) -> list[str]:
     least, most = (f"{end:.2g}" for end in (min(seconds.values()), max(seconds.values())))
     where = f"{first}{f' and {len(others)} more trials' if len(others) > 1 else f' and {others[0]}' if others else ''}"
     long = f"{least} s" if least == most else f"{least} to {most} s"
-    return [f"{where}: muscles are active for {long}; only spasticity uses these samples"]
+    return [f"{where}: muscles are active for {long}; analyses of a passive arm leave these samples out"]
 
 
 def joint_activity(trials: Sequence[Trial], muscles: Sequence[Muscle], n_joints: int) -> tuple[tuple[Trial, ...], list[str]]:

@@ -12,6 +12,7 @@ from ..analysis.balance import BALANCED, SAMPLES, Motion, motion_of, unexplained
 from ..errors import BadInput, Text
 from ..io import readings
 from ..io.dataset import Dataset
+from ..io.files import first_of
 from ..io.plausibility import OTHER_ZERO, hand_meets_handle
 from ..io.readings import Reading
 from ..io.trial import Trial, constant
@@ -93,8 +94,7 @@ def first_wrong(model: Model, trials: Sequence[Trial], *, met: bool) -> BadInput
     rest = _motion([t for t in trials if t.file not in alone])
     if 0 < 2 * len(alone) <= len(trials) and rest is not None and unexplained(model, rest) < _UNEXPLAINED:
         return next(iter(alone.values()))
-    more = f" and {len(trials) - 1} more" if len(trials) > 1 else ""
-    return None if together is None else together.within(file=trials[0].file + more)
+    return None if together is None else together.within(file=first_of([trial.file for trial in trials]))
 
 
 def balanced_trials(dataset: Dataset) -> list[Trial]:

@@ -9,6 +9,7 @@ from dataclasses import replace as changed
 import numpy as np
 
 from ...errors import BadInput
+from ...io.files import first_of
 from ...model import Model
 from . import clock, conventions, matching, trials
 from .reads import Read, angles_of, arrays, by, forces_of, values
@@ -122,16 +123,11 @@ def _refined(
             why = "explain them about as well, as where a movement repeats itself; if one of these is right, write it into import.toml"
             said = f"forces shifted by {shift.seconds:+.3f} s, but {rivals} {why} (force_shift) and import that"
             doubts.setdefault(said, []).append(file)
-    doubted = [f"{_of(files)}: {said}" for said, files in doubts.items()]
+    doubted = [f"{first_of(files)}: {said}" for said, files in doubts.items()]
     count = sum(map(len, doubts.values()))
     if 2 * count >= len(found) > count and len({shift.seconds for shift in found.values()}) > 1:
         doubted.append("the clocks of the other recordings were found together with these, and are in doubt as well")
-    return new, [f"forces shifted by {', '.join(f'{by} ({_of(files)})' for by, files in shifts.items())}"] if shifts else [], doubted
-
-
-def _of(files: Sequence[str]) -> str:
-    """Return the first of files, and how many more there are."""
-    return f"{files[0]} and {len(files) - 1} more" if len(files) > 1 else files[0]
+    return new, [f"forces shifted by {', '.join(f'{by} ({first_of(files)})' for by, files in shifts.items())}"] if shifts else [], doubted
 
 
 def _decided(
