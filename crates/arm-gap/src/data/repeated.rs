@@ -89,32 +89,24 @@ fn usual(mut repeats: Vec<Repeats>) -> Vec<Repeats> {
 fn outlier(repeats: &[Repeats]) -> Option<(usize, usize)> {
     /// Part of a channel's mean square that is rounding.
     const ROUNDING: f64 = 1e-12;
-    let mean_squares = |channels: &[Vec<f64>]| channels.iter().map(|c| mean_square(c)).collect();
-    let whole: Vec<Vec<f64>> = repeats
-        .iter()
-        .flat_map(Repeats::deviations)
-        .map(|d| mean_squares(&d.channels))
-        .collect();
+    let deviations: Vec<Vec<Thinned>> = repeats.iter().map(Repeats::deviations).collect();
+    let squares_of = |d: &Thinned| d.channels.iter().map(|c| mean_square(c)).collect();
+    let whole: Vec<Vec<f64>> = deviations.iter().flatten().map(squares_of).collect();
     let units: Vec<f64> = medians(&whole)
         .into_iter()
         .map(|median| libm::sqrt(median).max(f64::MIN_POSITIVE))
         .collect();
     let mut places = Vec::new();
     let mut squares: Vec<Vec<f64>> = Vec::new();
-    for (group, repeats) in repeats.iter().enumerate() {
-        let flat = |channels: &Channels| -> Vec<f64> {
-            let scaled = std::iter::zip(channels, &units);
-            scaled
-                .flat_map(|(c, unit)| c.iter().map(move |v| v / unit))
-                .collect()
-        };
-        let shifts = orthogonal(repeats.shifts.iter().map(flat).collect());
-        for (trial, deviation) in repeats.deviations().into_iter().enumerate() {
-            let mut left = flat(&deviation.channels);
+    for (group, own) in deviations.iter().enumerate() {
+        let shifts = repeats[group].shifts.iter();
+        let shifts = orthogonal(shifts.map(|shift| in_units(shift, &units)).collect());
+        for (trial, deviation) in own.iter().enumerate() {
+            let mut left = in_units(&deviation.channels, &units);
             project_off(&mut left, &shifts);
-            let each = left.chunks(deviation.channels[0].len().max(1));
+            let channels = left.chunks(deviation.channels[0].len().max(1));
             places.push((group, trial));
-            squares.push(each.map(mean_square).collect());
+            squares.push(channels.map(mean_square).collect());
         }
     }
     let usual = medians(&squares);
@@ -126,6 +118,13 @@ fn outlier(repeats: &[Repeats]) -> Option<(usize, usize)> {
     });
     far.max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, place)| place)
+}
+
+/// Channels one after the other, each in a unit of its own.
+fn in_units(channels: &Channels, units: &[f64]) -> Vec<f64> {
+    let scaled = std::iter::zip(channels, units);
+    let scaled = scaled.flat_map(|(channel, unit)| channel.iter().map(move |v| v / unit));
+    scaled.collect()
 }
 
 fn mean_square(series: &[f64]) -> f64 {

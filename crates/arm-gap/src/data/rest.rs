@@ -41,13 +41,28 @@ impl<const N: usize> PreparedSession<'_, N> {
 
     /// Whether nothing holds any joint of a hypothesis, though rest is left out: what did showed at rest alone.
     pub(crate) fn leaves_out_rest_for_nothing(&self, hypothesis: &Hypothesis<N>) -> bool {
-        !self.resting.is_empty() && dry_joints(hypothesis) == [false; N]
+        self.leaves_out_rest() && dry_joints(hypothesis) == [false; N]
+    }
+
+    /// Whether samples are left out because a joint rests there.
+    pub(crate) fn leaves_out_rest(&self) -> bool {
+        !self.resting.is_empty()
     }
 
     /// Compares rest as motion, until other joints are dry.
     pub(crate) fn compare_rest(&mut self) {
         self.resting.clear();
         self.cut();
+    }
+
+    /// What is found when no sample is left out because a joint rests there.
+    pub(crate) fn over_whole_trials<R>(&mut self, find: impl FnOnce(&Self) -> R) -> R {
+        let resting = std::mem::take(&mut self.resting);
+        self.cut();
+        let found = find(self);
+        self.resting = resting;
+        self.cut();
+        found
     }
 
     /// What the rest of joints with dry friction takes from the comparison of a movement.

@@ -95,16 +95,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             .collect()
     }
 
-    /// What is found when no sample is left out because a joint rests there.
-    pub(crate) fn over_whole_trials<R>(&mut self, find: impl FnOnce(&Self) -> R) -> R {
-        let resting = std::mem::take(&mut self.resting);
-        self.cut();
-        let found = find(self);
-        self.resting = resting;
-        self.cut();
-        found
-    }
-
     /// The hypothesis with the smoothing of each law of the base that costs least; where much is left, with all numbers fitted anew, as they
     /// may have been bent by the smoothing that they were fitted with.
     fn smoothed(&self, fitted: &Fitted<N>, laws: &[Target]) -> Fitted<N> {

@@ -162,7 +162,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ///
     /// * `slot`, `less` - the effect, and what was fitted without it
     /// * `base` - laws of the base, and what each gains
-    pub(crate) fn mimicked_beside(
+    pub(super) fn mimicked_beside(
         &self,
         (fitted, slot, less): (&Fitted<N>, usize, &Fitted<N>),
         base: &[(Effect<f64>, f64)],

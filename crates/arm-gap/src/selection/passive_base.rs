@@ -202,6 +202,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         current: &Fitted<N>,
         point: &LinearizationPoint<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
+        if current.asked.is_empty() || !self.dropped.contains(&true) {
+            return Ok(None);
+        }
         let (before, first) = (self.dropped.clone(), self.session.effects.len());
         let base = self.gains_of_base(point, current)?;
         for (slot, own) in current.asked.iter().enumerate() {

@@ -191,13 +191,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok((fitted, point))
     }
 
+    /// The clearest disturbance of a single trial where joints move; else one that is known, in whole trials.
     fn next_disturbance(
         &mut self,
         point: &LinearizationPoint<N>,
         known: &[TrialSpecific],
     ) -> Option<TrialSpecific> {
         let moving = self.disturbance(point, 1.0);
-        if moving.is_some() || known.is_empty() {
+        if moving.is_some() || known.is_empty() || !self.leaves_out_rest() {
             return moving;
         }
         // Other trials may have samples then.

@@ -131,15 +131,14 @@ impl<const N: usize> PreparedSession<'_, N> {
         // What is none competes all the same: where it explains most, the others only stand for it.
         let effects = point.hypothesis.effects();
         let is_finding = |one: &Explained| self.is_finding(&one.asked, suspect, &effects);
-        if !explained.first().is_some_and(is_finding) {
-            explained.clear();
-        }
-        explained.retain(is_finding);
+        let is_told = explained.first().is_some_and(is_finding);
+        explained.retain(|one| is_told && is_finding(one));
         (explained, scale * scatter.unwrap_or(1.0))
     }
 
     /// Whether what is asked can have happened in a trial: it deviates from all repeats by more than any of them does. Of two both deviate
-    /// alike, and the disturbed one is further from the model. And what hardly shows in the samples that are left, or in a joint that sticks, would have to be larger than anything.
+    /// alike, and the disturbed one is further from the model. And what hardly shows in the samples that are left, or in a joint that
+    /// sticks, would have to be larger than anything.
     fn is_possible(&self, one: &Asked, suspect: &Compared) -> bool {
         let own = dot(&one.row, &suspect.own);
         let others: Vec<f64> = suspect.others.iter().map(|o| dot(&one.row, o)).collect();
