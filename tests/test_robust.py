@@ -191,6 +191,22 @@ def test_a_process_that_is_asked_to_end_leaves_nothing(number: signal.Signals, s
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_an_interrupt_that_passes_through_a_string_being_run_ends_with_the_same_status(tmp_path: Path) -> None:
+    while_loading = "exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)')"
+    program = f"""
+import signal, sys, typer.main
+from armrs.__main__ import main
+typer.main.get_command = lambda app: {while_loading}
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["armrs", "effects"]
+main()
+"""
+    (tmp_path / "interrupted.py").write_text(program)
+    done = subprocess.run([sys.executable, "-m", "interrupted"], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "armrs: interrupted\n")
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("output", [">/dev/full", ">&-"])
 def test_a_full_or_closed_output_is_no_traceback(output: str) -> None:

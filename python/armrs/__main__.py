@@ -1,5 +1,6 @@
 """`armrs` and `python -m armrs`: the command line, and an end without a traceback while it still loads."""
 
+import contextlib
 import os
 import sys
 
@@ -11,10 +12,18 @@ def main() -> None:
     try:
         from .cli import run
 
-        run()
+        status, at_once = run()
     except KeyboardInterrupt as end:
         print("armrs: interrupted", file=sys.stderr)
-        sys.exit(getattr(end, "status", 130))
+        status, at_once = getattr(end, "status", 130), True
+    if at_once:
+        # Once an interrupt has passed through a string that is run, as libraries do while they load, Python ends by its own SIGINT
+        # whatever `sys.exit` says (CPython, `pymain_run_module`).
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError):
+                stream.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

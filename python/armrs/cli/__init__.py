@@ -9,7 +9,6 @@ nothing otherwise.
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import os
 import sys
@@ -160,19 +159,15 @@ def _prepare_outputs() -> None:
             stream.reconfigure(errors="replace")
 
 
-def run() -> None:
-    """Entry point of the command `armrs`."""
+def run() -> tuple[int, bool]:
+    """Run the command `armrs`; return its exit status, and whether the process has to end at once, without Python's own end."""
     interrupts.obey()
     _prepare_outputs()
     files.sweep_scratch()
     status = main()
-    interrupts.forget()
-    if interruptible.is_working():  # an interpreter that is taken down under a thread of the core may not end in order
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError):
-                stream.flush()
-        os._exit(status)
-    sys.exit(status)
+    ended = interrupts.forget()
+    # An interpreter that is taken down under a thread of the core may not end in order.
+    return status, ended or interruptible.is_working()
 
 
 _OPTIONS = {

@@ -62,8 +62,10 @@ def _exception() -> KeyboardInterrupt:
     return KeyboardInterrupt() if _received[0] == signal.SIGINT else Terminated(_received[0])
 
 
-def forget() -> None:
-    """Ask no more: the command has ended."""
+def forget() -> bool:
+    """Ask no more: the command has ended. Return whether a signal had asked for it."""
+    asked = bool(_received)
     _received.clear()
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+    return asked
