@@ -267,6 +267,7 @@ mod tests {
             qdd: column(still),
             base: None,
             rest: [0.0],
+            force: None,
         };
         let trials = [InMotion {
             trial: &trial,

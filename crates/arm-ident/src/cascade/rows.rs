@@ -73,12 +73,13 @@ impl<'a, const N: usize> Building<'a, N> {
                 qdd: rest,
                 base: None,
                 rest: [0.0; N],
+                force: None,
             },
             moving: moving_at(trial, cutoff)?,
             speed,
             moves,
             memory: InternalStates::new(&kept),
-            prediction: Prediction::of_unknowns(unknowns, &kept),
+            prediction: Prediction::of_unknowns(unknowns, &kept, [false; N]),
             kept,
             built: 0,
         })
@@ -223,6 +224,7 @@ fn moving_at<const N: usize>(trial: &Trial<N>, cutoff: f64) -> Result<Kinematics
         qdd: vec![Joints::zeros(); trial.len()],
         base: None,
         rest: [0.0; N],
+        force: None,
     };
     for j in 0..N {
         let angles: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();

@@ -15,9 +15,16 @@ pub struct Kinematics<const N: usize> {
     pub base: Option<Vec<Plane<f64>>>,
     /// Speed of each joint up to which it may rest \[rad/s\]: of a simulated motion zero, else what noise makes of rest.
     pub rest: [f64; N],
+    /// Force on the arm \[N\], where it was simulated with the motion.
+    pub force: Option<Vec<Plane<f64>>>,
 }
 
 impl<const N: usize> Kinematics<N> {
+    /// Whether a joint may rest in a sample.
+    pub fn rests(&self, sample: usize, joint: usize) -> bool {
+        self.qd[sample][joint].abs() <= self.rest[joint]
+    }
+
     /// The arm at a sample as its first joint moves: what it feels of gravity is less that joint's acceleration.
     pub fn felt(&self, chain: &Chain<f64, N>, i: usize) -> Chain<f64, N> {
         let ([gy, gz], base) = (chain.gravity(), self.base.as_ref());

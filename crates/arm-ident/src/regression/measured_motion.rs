@@ -77,6 +77,7 @@ pub fn measured<const N: usize>(
         qdd: vec![Joints::zeros(); trial.len()],
         base: base_acceleration(trial, &filter)?,
         rest: speed_noise(trial, band).map(slowest),
+        force: None,
     };
     for j in 0..N {
         let qd = speed(trial, j, &filter)?;
