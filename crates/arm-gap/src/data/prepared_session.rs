@@ -165,9 +165,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Whether a time \[s\] of a trial is left out because a disturbance has touched it.
+    ///
+    /// The contact does not place an arm of more than two joints: dry friction may hold it elsewhere than in its repeats from a disturbance
+    /// to the end of the trial.
     pub(crate) fn is_left_out(&self, trial: usize, time: f64) -> bool {
+        let stays = N > 2 && self.leaves_out_rest();
         let mut own = self.touched.iter().filter(|(t, _, _)| *t == trial);
-        own.any(|(_, start, end)| time >= start - AROUND.0 && time <= end + AROUND.1)
+        own.any(|(_, start, end)| {
+            time >= start - AROUND.0 && (stays || time <= end + AROUND.1)
+        })
     }
 
     /// Takes everything that disturbances have touched back in.

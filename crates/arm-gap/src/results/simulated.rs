@@ -45,7 +45,7 @@ pub struct SimulatedTrial {
     pub test: bool,
     /// Sampling rate \[Hz\].
     pub rate: f64,
-    /// Samples over which a gap is measured.
+    /// Samples over which a gap is measured, and which tell by how much repeats differ: not those that a disturbance has touched.
     pub counted: Vec<bool>,
     /// Measured channels.
     pub measured: Channels,
@@ -92,6 +92,9 @@ impl SimulatedTrial {
             let course = prepared.courses[i].as_ref();
             let mut trial = Self::measured(session, (i, &asked.trials[i].file), course);
             trial.group = prepared.group_of[i];
+            for (k, counted) in trial.counted.iter_mut().enumerate() {
+                *counted &= !prepared.is_left_out(i, k as f64 / course.rate);
+            }
             let own = plays
                 .iter()
                 .map(|(version, beliefs)| (*version, &beliefs[i]));
