@@ -33,16 +33,19 @@ class Discrepancy:
         Positive where the joint resists a growing angle more than the model does [N m].
     q, qd : ndarray, shape (n, n_joints)
         Angles and speeds of the joints [rad, rad/s]: simulated for a led arm, else measured.
+    counted : ndarray of bool, shape (n,)
+        Samples over which a gap is measured; not those that a disturbance has touched.
     """
 
     trial: Trial
     torque: np.ndarray
     q: np.ndarray
     qd: np.ndarray
+    counted: np.ndarray
 
     def valid(self) -> np.ndarray:
-        """Return which samples were measured, shape (n,)."""
-        return np.asarray(self.trial.valid, dtype=bool)
+        """Return which samples were measured and count, shape (n,)."""
+        return np.asarray(self.trial.valid, dtype=bool) & self.counted
 
 
 def discrepancies(dataset: Dataset, led: bool, plays: Sequence[SimulatedTrial], version: str) -> list[Discrepancy]:
@@ -74,10 +77,10 @@ def discrepancies(dataset: Dataset, led: bool, plays: Sequence[SimulatedTrial], 
             continue
         if led:
             q = simulated[:, :n]
-            listed.append(Discrepancy(trial, carried(measured) - carried(simulated), q, np.gradient(q, 1.0 / trial.rate, axis=0)))
+            listed.append(Discrepancy(trial, carried(measured) - carried(simulated), q, np.gradient(q, 1.0 / trial.rate, axis=0), play.counted))
         else:
             speed = np.gradient(trial.q, 1.0 / trial.rate, axis=0) if trial.dq is None else trial.dq
-            listed.append(Discrepancy(trial, measured - simulated, np.asarray(trial.q), np.asarray(speed)))
+            listed.append(Discrepancy(trial, measured - simulated, np.asarray(trial.q), np.asarray(speed), play.counted))
     return listed
 
 
