@@ -1429,6 +1429,7 @@ class Identification:
         neglected_inertia: Iterable[float],
         speed_noise: Iterable[float],
         not_simulated: str | None,
+        sticks: Iterable[int],
         model: Model,
         explained: Iterable[Fit],
     ) -> Identification: ...
@@ -1474,6 +1475,8 @@ class Identification:
     def speed_noise(self) -> tuple[float, ...]: ...
     @property
     def not_simulated(self) -> str | None: ...
+    @property
+    def sticks(self) -> tuple[int, ...]: ...
     @property
     def model(self) -> Model: ...
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -99,6 +100,11 @@ def whole(place: str, value: object, *, least: int, most: int | None = None) -> 
     if isinstance(value, bool) or result < least or (most is not None and result > most):
         raise BadInput(place, value, allowed)
     return result
+
+
+def threads(value: object) -> int:
+    """Return a number of threads; as many as there are processors for None."""
+    return (os.cpu_count() or 1) if value is None else whole("threads", value, least=1, most=1024)
 
 
 def bits(place: str, value: object) -> int:

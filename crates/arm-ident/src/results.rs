@@ -1,5 +1,6 @@
 //! What an identification came to, in the terms of files and reports: one type for Rust, Python and JSON.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use arm_core::effect::{Effect as CoreEffect, Place};
@@ -107,6 +108,8 @@ pub struct Identification {
     pub speed_noise: Vec<f64>,
     /// Why the motion was measured where it was to be simulated if that could be done.
     pub not_simulated: Option<String>,
+    /// Joints, from 1, whose dry friction is set-valued in `model` though the smooth law was given: they stick.
+    pub sticks: Vec<usize>,
     /// The model with the estimates.
     pub model: Model,
     /// How each trial is explained.
@@ -146,6 +149,7 @@ impl Identification {
             neglected_inertia: result.neglected_inertia.clone(),
             speed_noise: result.speed_noise.clone(),
             not_simulated: not_simulated.map(ToString::to_string),
+            sticks: sticking_anew(&result.fitted, asked.effects),
             model: identified_model(&result.chain, &result.fitted, asked)?,
             explained: result
                 .explained
@@ -199,6 +203,17 @@ fn by_configuration<const N: usize>(trials: &[Fitted<'_, N>]) -> Named<Named<Nam
     all
 }
 
+/// Joints, from 1, with a fitted effect that is set-valued and was given as smooth.
+fn sticking_anew(fitted: &[CoreEffect<f64>], given: &[CoreEffect<f64>]) -> Vec<usize> {
+    let was_smooth = |one: &CoreEffect<f64>| {
+        let mut same = given.iter();
+        same.any(|e| (e.kind, e.index) == (one.kind, one.index) && !e.is_dry())
+    };
+    let anew = fitted.iter().filter(|e| e.is_dry() && was_smooth(e));
+    let joints: BTreeSet<usize> = anew.map(|e| e.index + 1).collect();
+    joints.into_iter().collect()
+}
+
 /// An inertia below this part of mass · length² is a difference of equal numbers.
 const ROUNDING: f64 = 1e-12;
 
@@ -243,7 +258,7 @@ const MODEL_FILE: &str = "identified.toml";
 impl Serialize for Identification {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let warnings = [&self.contradictions[..], &self.misfits, &self.left_out].concat();
-        let mut out = to.serialize_struct("Identification", 17)?;
+        let mut out = to.serialize_struct("Identification", 18)?;
         out.serialize_field("method", &self.method)?;
         out.serialize_field("status", &self.status)?;
         out.serialize_field("rank", &self.rank)?;
@@ -258,6 +273,7 @@ impl Serialize for Identification {
         out.serialize_field("scale_free", &self.scale_free)?;
         out.serialize_field("level", &self.level)?;
         out.serialize_field("cutoff_Hz", &self.cutoff)?;
+        out.serialize_field("sticks", &self.sticks)?;
         out.serialize_field("residual_rms", &self.residual_rms)?;
         let by_configuration = &self.residual_rms_by_configuration;
         out.serialize_field("residual_rms_by_configuration", by_configuration)?;

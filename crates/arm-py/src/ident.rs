@@ -50,6 +50,7 @@ pub struct Settings {
     cutoff: Option<f64>,
     motion: String,
     level: f64,
+    threads: usize,
 }
 
 impl Settings {
@@ -210,9 +211,10 @@ pub fn identify(
                 "simulated" => MotionSource::Simulated,
                 other => return Err(bad_input("motion", other, "auto, measured or simulated")),
             },
+            may_stick: true,
             tolerance: settings.tolerance(),
             level: settings.level,
-            threads: 1,
+            threads: settings.threads,
         };
         let cascade = arm_ident::cascade::Options {
             cutoff: settings.cutoff,

@@ -80,6 +80,7 @@ def _identify(dataset: Dataset, question: Question) -> Identified:
         cutoff=question.cutoff,
         motion=question.motion,
         level=question.level,
+        threads=1,  # cases are what runs at a time
     )
 
 

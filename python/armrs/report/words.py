@@ -222,7 +222,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     head(result, verdict(result))
     show("What these movements determine", tables.estimates(tables.measured(result), joints, level))
     show("Parameters", tables.estimates(result["parameters"], joints, level))
-    print("\n".join([SYMBOLS, INTERVALS, *decided_lines(result["parameters"])]) + "\n")
+    print("\n".join([SYMBOLS, INTERVALS, *decided_lines(result["parameters"]), *sticking_lines(result)]) + "\n")
     show(
         "Sensor calibration; the prior is the declared tolerance, one standard deviation",
         tables.estimates(result["calibration"], joints, level),
@@ -236,6 +236,12 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         print("No test trials: nothing was checked on data that no fit has seen.")
     followed(result)
     files_written(written)
+
+
+def sticking_lines(result: Mapping[str, Any]) -> list[str]:
+    """Say in which joints dry friction that sticks took the place of smooth friction, a line each."""
+    why = "sticks (smoothing 0): with the smooth law, simulated angles and forces are further from the recorded ones."
+    return [f"Dry friction in joint {j} {why}" for j in result.get("sticks", ())]
 
 
 def followed(result: Mapping[str, Any]) -> None:

@@ -239,6 +239,7 @@ def identify(
     cutoff: float | None = None,
     motion: str = "auto",
     level: float = 0.95,
+    threads: int | None = None,
 ) -> Identified:
     """Identify segment and joint parameters on the fit trials of a data set.
 
@@ -257,10 +258,18 @@ def identify(
         does not follow it, with the values that fit the measured motion; if these do not either, measured, with a line in `warnings`.
     level : float
         Probability of the intervals.
+    threads : int, optional
+        Over which trials are spread; as many as there are processors when absent. The result is the same.
 
     Returns
     -------
     Identified
+
+    Notes
+    -----
+    The default smoothing of dry friction, 0.01 rad/s, is no property of an arm: along simulated motion such friction is fitted as
+    set-valued too, with which a joint sticks. The law with which simulated angles and forces are closer to the recorded ones stands in
+    `model`. Another smoothing is kept.
 
     Raises
     ------
@@ -282,7 +291,9 @@ def identify(
     dataset, effects, fitted = _with_muscles(dataset, effects, fitted)
     if not model.segment_uncertainty and not any(fitted):
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
-    settings = CoreSettings(model, fitted, dataset.tolerance, method=method, cutoff=cutoff, motion=motion, level=level)
+    settings = CoreSettings(
+        model, fitted, dataset.tolerance, method=method, cutoff=cutoff, motion=motion, level=level, threads=checks.threads(threads)
+    )
     refuse_implausible(dataset)
     unproved = examine_setup(dataset)
     with naming_trials(dataset.trials):
@@ -459,6 +470,7 @@ class CoreSettings:
     cutoff: float | None = None
     motion: str = "auto"
     level: float = 0.95
+    threads: int = 1
 
 
 _FAR = 2.0

@@ -171,9 +171,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn is_left_out(&self, trial: usize, time: f64) -> bool {
         let stays = N > 2 && self.leaves_out_rest();
         let mut own = self.touched.iter().filter(|(t, _, _)| *t == trial);
-        own.any(|(_, start, end)| {
-            time >= start - AROUND.0 && (stays || time <= end + AROUND.1)
-        })
+        own.any(|(_, start, end)| time >= start - AROUND.0 && (stays || time <= end + AROUND.1))
     }
 
     /// Takes everything that disturbances have touched back in.

@@ -5,9 +5,11 @@ use crate::inference::cutoff::best_cutoff;
 use crate::inference::estimate::Identified;
 use crate::inference::multistart::{Ended, best};
 use crate::inference::start::{SHARES, typical};
+use crate::inference::sticking::{misfit, sticking};
 use crate::inference::summary::{Fit, summarise};
+use crate::inference::updated_model::{half_way, updated, values};
 use crate::inference::weighted_fit::{Solved, explain, weighted};
-use crate::regression::equation::{Building, effect_value, value_of};
+use crate::regression::equation::Building;
 use crate::regression::instrument::Instrument;
 use crate::regression::measured_motion::widened;
 use crate::regression::measured_motion::{candidates, measured, relative_speed_noise};
@@ -17,10 +19,8 @@ use crate::regression::preprocessing::{
 use crate::regression::sensitivity::{HELD, damped};
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
-use crate::regression::unknown::{Imperfection, Moment, Source, Unknown, spring, unknowns};
+use crate::regression::unknown::{Imperfection, Source, Unknown, unknowns};
 use crate::threads::parallel;
-use arm_core::Chain;
-use arm_core::effect::Effect;
 use arm_numerics::NumericsError;
 
 /// Most rounds of fitting, re-linearising and, where the motion is simulated, simulating again.
@@ -54,6 +54,8 @@ pub struct Options {
     pub cutoff: Option<f64>,
     /// Where the motion comes from.
     pub motion: MotionSource,
+    /// Whether dry friction with the default smoothing is fitted as set-valued too; the law that describes the simulated runs better stands.
+    pub may_stick: bool,
     /// What the calibration promises.
     pub tolerance: Tolerance,
     /// Probability of the intervals.
@@ -67,6 +69,7 @@ impl Default for Options {
         Self {
             cutoff: None,
             motion: MotionSource::Auto,
+            may_stick: false,
             tolerance: Tolerance::default(),
             level: 0.95,
             threads: 1,
@@ -219,7 +222,13 @@ impl<const N: usize> Task<'_, N> {
         let measured = || self.by_measured(model, options.cutoff);
         let simulated = |from: &Model<N>| self.by_simulation(from, options.cutoff);
         let certain = |(task, found)| (task, found, None);
-        let restarted = |(task, found): (Self, _)| (task, task.restarted(found));
+        let restarted = |(task, found): (Self, _)| {
+            let found = task.restarted(found);
+            match options.may_stick {
+                true => (task, task.or_sticking(found)),
+                false => (task, found),
+            }
+        };
         match options.motion {
             MotionSource::Simulated => return simulated(model).map(restarted).map(certain),
             MotionSource::Auto if self.fit.iter().all(|t| can_simulate(t)) => {}
@@ -299,6 +308,19 @@ impl<const N: usize> Task<'_, N> {
             }
             self.settle(updated(&other.model, unknowns, &x).ok()?).ok()
         })
+    }
+
+    /// The fit with set-valued friction from where a fit with smooth friction ended, if it describes the simulated runs better.
+    fn or_sticking(&self, found: Settled<N>) -> Settled<N> {
+        let misfit = |one: &Settled<N>| {
+            let fitted = (&one.model, self.unknowns, &one.solved.outcome);
+            misfit(fitted, self.fit, self.cutoff)
+        };
+        let other = sticking(&found.model).and_then(|start| self.settle(start).ok());
+        match other.map(|other| (misfit(&other), misfit(&found), other)) {
+            Some((Ok(sticking), Ok(smooth), other)) if sticking + AGREED < smooth => other,
+            _ => found,
+        }
     }
 
     /// Fits, linearises again and, where the motion is simulated, simulates again until the estimate stands.
@@ -423,7 +445,7 @@ fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
 }
 
 /// The estimated delay of the force channels \[s\], zero where it is taken as known.
-fn delay(unknowns: &[Unknown], x: &[f64]) -> f64 {
+pub(crate) fn delay(unknowns: &[Unknown], x: &[f64]) -> f64 {
     let is_delay = |u: &Unknown| u.source == Source::Calibration(Imperfection::TimeDelay);
     unknowns
         .iter()
@@ -505,83 +527,4 @@ fn deviations<const N: usize>(fit: &[&Trial<N>], pieces: &[&Pieces]) -> Vec<Vec<
         }
     }
     all
-}
-
-/// The model with estimates in place of its own values.
-fn updated<const N: usize>(
-    model: &Model<N>,
-    unknowns: &[Unknown],
-    x: &[f64],
-) -> Result<Model<N>, IdentError> {
-    let mut next = model.clone();
-    let mut segments = *model.chain.segments();
-    for (k, segment) in segments.iter_mut().enumerate() {
-        let value = |moment| {
-            unknowns
-                .iter()
-                .position(|u| u.source == Source::Segment(k, moment))
-                .map(|u| x[u])
-        };
-        let (Some(mass), Some(along), Some(inertia)) = (
-            value(Moment::Mass),
-            value(Moment::Along),
-            value(Moment::Inertia),
-        ) else {
-            continue;
-        };
-        let normal = value(Moment::Normal).unwrap_or(mass * segment.com[1]);
-        segment.mass = mass;
-        segment.com = [along / mass, normal / mass];
-        segment.inertia = (inertia - (along * along + normal * normal) / mass).max(0.0);
-    }
-    for (u, unknown) in unknowns.iter().enumerate() {
-        if let Source::Effect(e, p) = unknown.source {
-            next.fitted[e].parameters[p] = x[u];
-        }
-    }
-    for (u, unknown) in unknowns.iter().enumerate() {
-        if let Source::RestTorque(e, rest) = unknown.source {
-            set_rest(&mut next.fitted[e], rest, x[u]);
-        }
-    }
-    next.chain = Chain::new(segments, model.chain.base(), model.chain.gravity())
-        .and_then(|c| c.with_rotor_inertia(*model.chain.rotor_inertia()))
-        .map_err(IdentError::Model)?;
-    Ok(next)
-}
-
-/// The rest angle of a spring from amplitude · rest, within its bounds; a spring without amplitude keeps its own.
-fn set_rest(effect: &mut Effect<f64>, rest: usize, torque: f64) {
-    let bounds = effect.kind.info().parameters[rest];
-    if let Some((amplitude, _)) = spring(effect)
-        && effect.parameters[amplitude] != 0.0
-    {
-        let angle = torque / effect.parameters[amplitude];
-        effect.parameters[rest] = angle.clamp(bounds.min, bounds.max);
-    }
-}
-
-/// The model half way between two.
-fn half_way<const N: usize>(
-    from: &Model<N>,
-    to: &Model<N>,
-    unknowns: &[Unknown],
-) -> Result<Model<N>, IdentError> {
-    let x: Vec<f64> = values(from, unknowns)
-        .iter()
-        .zip(values(to, unknowns))
-        .map(|(a, b)| 0.5 * (a + b))
-        .collect();
-    updated(from, unknowns, &x)
-}
-
-/// The model's own values of the unknowns, zero for those of the calibration.
-fn values<const N: usize>(model: &Model<N>, unknowns: &[Unknown]) -> Vec<f64> {
-    unknowns
-        .iter()
-        .map(|u| match u.source {
-            Source::Segment(k, moment) => value_of(&model.chain, k, moment),
-            source => effect_value(model, source),
-        })
-        .collect()
 }

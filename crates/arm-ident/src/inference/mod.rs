@@ -9,5 +9,7 @@ pub mod joint_method;
 pub(crate) mod multistart;
 pub mod rank;
 pub mod start;
+pub(crate) mod sticking;
 pub(crate) mod summary;
+pub(crate) mod updated_model;
 pub(crate) mod weighted_fit;

@@ -160,6 +160,8 @@ result_class! {
         speed_noise: Vec<f64>, "";
         /// Why the motion was measured where it was to be simulated if that could be done.
         not_simulated: Option<String>, "";
+        /// Joints, from 1, whose dry friction is set-valued in `model` though the smooth law was given: they stick.
+        sticks: Vec<usize>, "";
         /// The model with the estimates.
         model: arm_model::Model, "";
         /// How each trial is explained.

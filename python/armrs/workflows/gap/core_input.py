@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -69,5 +68,5 @@ def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequenc
         led=led,
         weights=[weights.get(t.configuration, 1.0) for t in dataset.trials],
         own=list(own),
-        threads=(os.cpu_count() or 1) if threads is None else checks.whole("threads", threads, least=1, most=1024),
+        threads=checks.threads(threads),
     )

@@ -77,7 +77,9 @@ def discrepancies(dataset: Dataset, led: bool, plays: Sequence[SimulatedTrial], 
             continue
         if led:
             q = simulated[:, :n]
-            listed.append(Discrepancy(trial, carried(measured) - carried(simulated), q, np.gradient(q, 1.0 / trial.rate, axis=0), play.counted))
+            listed.append(
+                Discrepancy(trial, carried(measured) - carried(simulated), q, np.gradient(q, 1.0 / trial.rate, axis=0), play.counted)
+            )
         else:
             speed = np.gradient(trial.q, 1.0 / trial.rate, axis=0) if trial.dq is None else trial.dq
             listed.append(Discrepancy(trial, measured - simulated, np.asarray(trial.q), np.asarray(speed), play.counted))
