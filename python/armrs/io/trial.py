@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -451,3 +451,21 @@ def still_angles(trials: tuple[Trial, ...]) -> list[str]:
         if all(level is not None and level == levels[0] for level in levels):
             lines.append(f"q{j + 1} is {levels[0]:g} rad in every sample of every trial: a joint that is held, or a dead sensor?")
     return lines
+
+
+def bridged(trial: Trial) -> Trial:
+    """Return a trial for the core, which reads no NaN: gaps are bridged by straight lines, and masked by `valid`."""
+
+    def whole(values: np.ndarray | None) -> np.ndarray | None:
+        if values is None or np.isfinite(values).all():
+            return values
+        table = np.array(values, dtype=float).reshape(len(trial), -1)
+        for column in table.T:
+            bad = ~np.isfinite(column)
+            if bad.any():
+                column[bad] = np.interp(trial.t[bad], trial.t[~bad], column[~bad])
+        return table.reshape(values.shape)
+
+    channels = ("q", "dq", "force_on_arm", "moment_on_arm", "tau", "robot_q", "base", "activity")
+    filled: dict[str, Any] = {name: whole(getattr(trial, name)) for name in channels}
+    return replace(trial, **filled)

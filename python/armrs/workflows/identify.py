@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -19,7 +19,7 @@ from ..errors import BadInput, IdentificationError, Text, unknown_name
 from ..io.dataset import FILE, Dataset, load_dataset, naming_trials, refuse_other_arms
 from ..io.muscle_activity import active_kept
 from ..io.plausibility import hand_meets_handle, refuse_implausible
-from ..io.trial import Trial, refuse_moving_base
+from ..io.trial import bridged, refuse_moving_base
 from ..model import Effect, Model, Tolerance
 from ..tabular import SYMBOLS, Labelled, Series, Tabular, Tidy, over_trials
 from ..telling import telling
@@ -282,7 +282,7 @@ def identify(
     --------
     >>> result = armrs.identify("demo/data", with_effects=["coulomb"])  # doctest: +SKIP
     >>> print(result.combinations[0])  # doctest: +SKIP
-    m1*l1 + a1*m2 = 0.7033 ± 0.0088 kg m
+    m1*l1 + a1*m2 = 0.7032 ± 0.0088 kg m
     """
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     kinds = _checked(dataset, method, with_effects, cutoff, motion, level)
@@ -587,24 +587,6 @@ def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
             raise BadInput("with_effects", kind, f"an arm of {first} joints or more: it acts over two of them")
         added += [Effect(kind, j) for j in range(first, model.n_joints + 1) if (kind, j) not in present]
     return added
-
-
-def bridged(trial: Trial) -> Trial:
-    """Return a trial for the core, which reads no NaN: gaps are bridged by straight lines, and masked by `valid`."""
-
-    def whole(values: np.ndarray | None) -> np.ndarray | None:
-        if values is None or np.isfinite(values).all():
-            return values
-        table = np.array(values, dtype=float).reshape(len(trial), -1)
-        for column in table.T:
-            bad = ~np.isfinite(column)
-            if bad.any():
-                column[bad] = np.interp(trial.t[bad], trial.t[~bad], column[~bad])
-        return table.reshape(values.shape)
-
-    channels = ("q", "dq", "force_on_arm", "moment_on_arm", "tau", "robot_q", "base", "activity")
-    filled: dict[str, Any] = {name: whole(getattr(trial, name)) for name in channels}
-    return replace(trial, **filled)
 
 
 def _with_caveat(estimates: Sequence[Estimate], caveat: str | None) -> tuple[Estimate, ...]:

@@ -19,7 +19,7 @@ use crate::regression::preprocessing::{
 use crate::regression::sensitivity::{HELD, damped};
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
-use crate::regression::unknown::{Imperfection, Source, Unknown, unknowns};
+use crate::regression::unknown::{Source, Unknown, delay, unknowns};
 use crate::threads::parallel;
 use arm_numerics::NumericsError;
 
@@ -442,15 +442,6 @@ fn can_simulate<const N: usize>(trial: &Trial<N>) -> bool {
         .flatten()
         .any(|t| t.iter().any(|&v| v != 0.0));
     trial.handle.is_some() && !moment && !torque
-}
-
-/// The estimated delay of the force channels \[s\], zero where it is taken as known.
-pub(crate) fn delay(unknowns: &[Unknown], x: &[f64]) -> f64 {
-    let is_delay = |u: &Unknown| u.source == Source::Calibration(Imperfection::TimeDelay);
-    unknowns
-        .iter()
-        .position(is_delay)
-        .map_or(0.0, |place| x[place])
 }
 
 /// How far a round moved the estimate, in units of its noise.

@@ -6,11 +6,10 @@ use arm_core::effect::Effect;
 use arm_numerics::least_squares::outcome::Outcome;
 
 use crate::error::IdentError;
-use crate::inference::joint_method::delay;
 use crate::regression::measured_motion::low_pass;
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Trial};
-use crate::regression::unknown::Unknown;
+use crate::regression::unknown::{Unknown, delay};
 
 /// The model with set-valued friction in place of fitted smooth friction whose smoothing speed is the default: that serves an explicit
 /// step and is no property of an arm, see `arm-core`. `None` without such an effect.

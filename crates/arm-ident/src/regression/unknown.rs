@@ -292,3 +292,12 @@ pub(crate) fn calibration<const N: usize>(
     }
     list
 }
+
+/// The estimated delay of the force channels \[s\], zero where it is taken as known.
+pub(crate) fn delay(unknowns: &[Unknown], x: &[f64]) -> f64 {
+    let is_delay = |u: &Unknown| u.source == Source::Calibration(Imperfection::TimeDelay);
+    unknowns
+        .iter()
+        .position(is_delay)
+        .map_or(0.0, |place| x[place])
+}

@@ -10,9 +10,8 @@ from ... import _armrs, checks
 from ...catalogue import catalogue
 from ...errors import BadInput
 from ...io.dataset import Dataset, refuse_other_arms
-from ...io.trial import Trial
+from ...io.trial import Trial, bridged
 from ...model import Model, Tolerance
-from ..identify import bridged
 from .between_samples import unresolved_movements
 
 

@@ -10,9 +10,8 @@ import numpy as np
 from ... import _armrs, interruptible
 from ..._armrs import Alternative, Missing, Separation
 from ...errors import ArmrsError, SimulationError
-from ...io.trial import Trial
+from ...io.trial import Trial, bridged
 from ...model import Model
-from ..identify import bridged
 from ..movement import Movement
 from ..simulate import Sensors, simulate
 from .core_input import core_settings, core_trials, is_led
