@@ -79,7 +79,7 @@ impl<'a, const N: usize> Building<'a, N> {
             speed,
             moves,
             memory: InternalStates::new(&kept),
-            prediction: Prediction::of_unknowns(unknowns, &kept, [false; N]),
+            prediction: Prediction::of_unknowns(unknowns, &kept),
             kept,
             built: 0,
         })

@@ -15,12 +15,9 @@ use crate::regression::unknown::{Imperfection, Source, Unknown};
 /// The force on the arm \[N\] that the model predicts for a motion, sample after sample.
 ///
 /// That of the simulation where the motion is simulated. Else least squares of `Jᵀ F = B q̈ + C q̇ + G + R − τ − M` over the two
-/// components of the force; in a pose in which a component does no work (a stretched arm) that component is zero. What holds a joint
-/// that rests is not known: its row is left out, and what the other rows do not tell is as measured. Zero where the arm is not led by
-/// a force.
+/// components of the force; in a pose in which a component does no work (a stretched arm) that component is zero. Zero where the arm is
+/// not led by a force.
 pub(crate) struct Prediction<const N: usize> {
-    /// Joints with set-valued dry friction.
-    dry: [bool; N],
     memory: InternalStates<N>,
     near: Nearby,
     /// Samples of which the force is known.
@@ -39,12 +36,9 @@ pub(crate) struct Nearby {
 
 impl<const N: usize> Prediction<N> {
     /// Before the first sample; none where no imperfection of the measurement is among the unknowns.
-    ///
-    /// * `dry` - joints that set-valued friction may hold
-    pub fn of_unknowns(unknowns: &[Unknown], model: &Model<N>, dry: [bool; N]) -> Option<Self> {
+    pub fn of_unknowns(unknowns: &[Unknown], model: &Model<N>) -> Option<Self> {
         let is_calibration = |u: &Unknown| matches!(u.source, Source::Calibration(_));
         unknowns.iter().any(is_calibration).then(|| Self {
-            dry,
             memory: InternalStates::new(model),
             near: Nearby::default(),
             known: 0,
@@ -72,9 +66,9 @@ impl<const N: usize> Prediction<N> {
     fn force(&mut self, model: &Model<N>, trial: &Trial<N>, motion: &Kinematics<N>) -> Plane<f64> {
         let i = self.known;
         self.known += 1;
-        let Some(measured) = &trial.force_on_arm else {
+        if trial.force_on_arm.is_none() {
             return [0.0; 2];
-        };
+        }
         if let Some(force) = &motion.force {
             return force[i];
         }
@@ -82,22 +76,12 @@ impl<const N: usize> Prediction<N> {
         let pose = Pose::new(q);
         let seen = trial.motion(i, q, qd);
         self.memory.advance(&seen, 1.0 / trial.rate);
-        let mut torque = inverse_dynamics(&motion.felt(&model.chain, i), &pose, qd, qdd)
+        let torque = inverse_dynamics(&motion.felt(&model.chain, i), &pose, qd, qdd)
             + resisting_torque(&model.fitted, &seen, &self.memory.fitted)
             + resisting_torque(&model.held, &seen, &self.memory.held)
             - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i])
             - Joints::repeat(trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]));
-        let mut j = jacobian(&model.chain, &pose);
-        let rests = |k: usize| self.dry[k] && motion.rests(i, k);
-        let near = if (0..N).any(rests) {
-            measured[i]
-        } else {
-            [0.0; 2]
-        };
-        torque -= static_torque(&model.chain, &pose, near, 0.0);
-        for k in (0..N).filter(|&k| rests(k)) {
-            j.column_mut(k).fill(0.0);
-        }
+        let j = jacobian(&model.chain, &pose);
         let (a, b, c) = (
             j.row(0).dot(&j.row(0)),
             j.row(0).dot(&j.row(1)),
@@ -108,12 +92,9 @@ impl<const N: usize> Prediction<N> {
         let damping = 1e-3 * (a + c);
         let (a, c) = (a + damping, c + damping);
         let determinant = a * c - b * b;
-        if determinant == 0.0 {
-            return near;
-        }
         [
-            near[0] + (c * rhs[0] - b * rhs[1]) / determinant,
-            near[1] + (a * rhs[1] - b * rhs[0]) / determinant,
+            (c * rhs[0] - b * rhs[1]) / determinant,
+            (a * rhs[1] - b * rhs[0]) / determinant,
         ]
     }
 }

@@ -41,7 +41,6 @@ impl<'a, const N: usize> Building<'a, N> {
         trial: &'a Trial<N>,
         motion: &'a Kinematics<N>,
     ) -> Self {
-        let dry = sticking(model);
         Self {
             model,
             unknowns,
@@ -49,8 +48,8 @@ impl<'a, const N: usize> Building<'a, N> {
             motion,
             memory: InternalStates::new(model),
             regressed: regressed(model, unknowns),
-            prediction: Prediction::of_unknowns(unknowns, model, dry),
-            dry,
+            prediction: Prediction::of_unknowns(unknowns, model),
+            dry: sticking(model),
             built: 0,
         }
     }
@@ -62,7 +61,7 @@ impl<'a, const N: usize> Building<'a, N> {
 
     /// Whether set-valued friction holds a joint in a sample.
     pub fn rests(&self, sample: usize, joint: usize) -> bool {
-        self.dry[joint] && self.motion.rests(sample, joint)
+        self.dry[joint] && self.motion.qd[sample][joint].abs() <= self.motion.rest[joint]
     }
 
     /// Takes what resting joints hold out of the right-hand side.

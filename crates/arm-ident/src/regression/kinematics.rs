@@ -20,11 +20,6 @@ pub struct Kinematics<const N: usize> {
 }
 
 impl<const N: usize> Kinematics<N> {
-    /// Whether a joint may rest in a sample.
-    pub fn rests(&self, sample: usize, joint: usize) -> bool {
-        self.qd[sample][joint].abs() <= self.rest[joint]
-    }
-
     /// The arm at a sample as its first joint moves: what it feels of gravity is less that joint's acceleration.
     pub fn felt(&self, chain: &Chain<f64, N>, i: usize) -> Chain<f64, N> {
         let ([gy, gz], base) = (chain.gravity(), self.base.as_ref());
