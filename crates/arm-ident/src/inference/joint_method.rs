@@ -314,7 +314,7 @@ impl<const N: usize> Task<'_, N> {
     fn or_sticking(&self, found: Settled<N>) -> Settled<N> {
         let misfit = |one: &Settled<N>| {
             let fitted = (&one.model, self.unknowns, &one.solved.outcome);
-            misfit(fitted, self.fit, self.cutoff)
+            misfit(fitted, self.fit, (self.cutoff, self.threads))
         };
         let other = sticking(&found.model).and_then(|start| self.settle(start).ok());
         match other.map(|other| (misfit(&other), misfit(&found), other)) {

@@ -10,6 +10,7 @@ use crate::regression::measured_motion::low_pass;
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Unknown, delay};
+use crate::threads::parallel;
 
 /// The model with set-valued friction in place of fitted smooth friction whose smoothing speed is the default: that serves an explicit
 /// step and is no property of an arm, see `arm-core`. `None` without such an effect.
@@ -35,48 +36,63 @@ fn is_default(effect: &Effect<f64>, parameter: usize) -> bool {
 /// constant, with the variances that the differences themselves have. What stays the same in a trial, as offsets do, does not count.
 ///
 /// * `cutoff` - of the common low-pass \[Hz\]
+/// * `threads` - over which trials are spread; the result has the same bits for any number
 ///
 /// # Errors
 /// [`IdentError`] for a trial that cannot be simulated or is too short for the filter.
 pub(crate) fn misfit<const N: usize>(
     (model, unknowns, found): (&Model<N>, &[Unknown], &Outcome),
     trials: &[&Trial<N>],
-    cutoff: f64,
+    (cutoff, threads): (f64, usize),
 ) -> Result<f64, IdentError> {
     let delay = delay(unknowns, &found.x);
+    let one = |k: usize| squares(model, trials[k], (cutoff, delay));
     let mut squares = vec![0.0; N + 2];
-    let (mut count, mut duration) = (0.0, 0.0);
-    for trial in trials {
-        let course = simulated(model, trial, cutoff)?;
-        let filter = low_pass(cutoff, trial.rate)?;
-        let mut differences = vec![Vec::with_capacity(trial.len()); N + 2];
-        let (angles, forces) = (course.angles_at_samples(), course.force_at_samples());
-        for (i, (q, force)) in angles.zip(forces).enumerate() {
-            for j in 0..N {
-                differences[j].push(trial.q[i][j] - q[j]);
-            }
-            let measured = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
-            let delayed = course.change_by_delay(delay, i);
-            for axis in 0..2 {
-                differences[N + axis].push(measured[axis] - force[axis] - delayed[axis]);
-            }
+    for own in parallel(threads, trials.len(), one) {
+        for (sum, own) in squares.iter_mut().zip(own?) {
+            *sum += own;
         }
-        for (square, smooth) in squares.iter_mut().zip(filter.both_ways_all(&differences)?) {
-            let counted = || smooth.iter().zip(&trial.valid).filter(|(_, valid)| **valid);
-            let mean = counted().map(|(v, _)| v).sum::<f64>() / counted().count().max(1) as f64;
-            *square += counted().map(|(v, _)| (v - mean) * (v - mean)).sum::<f64>();
-        }
-        let valid = trial.valid.iter().filter(|v| **v).count() as f64;
-        count += valid;
-        duration += valid / trial.rate;
     }
+    let valid = |t: &&Trial<N>| t.valid.iter().filter(|v| **v).count() as f64;
+    let count: f64 = trials.iter().map(valid).sum();
+    let duration: f64 = trials.iter().map(|t| valid(t) / t.rate).sum();
     // A band has room for so many independent samples.
     let independent = f64::min(2.0 * cutoff * duration, count);
-    let logarithms = squares
-        .iter()
-        .filter(|s| **s > 0.0)
-        .map(|s| libm::log(s / count));
-    Ok(independent * logarithms.sum::<f64>())
+    let logarithms = squares.iter().filter(|s| **s > 0.0);
+    Ok(independent * logarithms.map(|s| libm::log(s / count)).sum::<f64>())
+}
+
+/// Sums of squares of what simulated angles and forces of a trial differ by from the measured ones, low-passed, without their means.
+fn squares<const N: usize>(
+    model: &Model<N>,
+    trial: &Trial<N>,
+    (cutoff, delay): (f64, f64),
+) -> Result<Vec<f64>, IdentError> {
+    let course = simulated(model, trial, cutoff)?;
+    let mut differences = vec![Vec::with_capacity(trial.len()); N + 2];
+    let (angles, forces) = (course.angles_at_samples(), course.force_at_samples());
+    for (i, (q, force)) in angles.zip(forces).enumerate() {
+        for j in 0..N {
+            differences[j].push(trial.q[i][j] - q[j]);
+        }
+        let measured = trial.force_on_arm.as_ref().map_or([0.0; 2], |f| f[i]);
+        let delayed = course.change_by_delay(delay, i);
+        for axis in 0..2 {
+            differences[N + axis].push(measured[axis] - force[axis] - delayed[axis]);
+        }
+    }
+    let smooth = low_pass(cutoff, trial.rate)?.both_ways_all(&differences)?;
+    let square = |channel: &Vec<f64>| {
+        let counted = || {
+            channel
+                .iter()
+                .zip(&trial.valid)
+                .filter(|(_, valid)| **valid)
+        };
+        let mean = counted().map(|(v, _)| v).sum::<f64>() / counted().count().max(1) as f64;
+        counted().map(|(v, _)| (v - mean) * (v - mean)).sum()
+    };
+    Ok(smooth.iter().map(square).collect())
 }
 
 #[cfg(test)]
