@@ -268,8 +268,8 @@ def identify(
     Notes
     -----
     The default smoothing of dry friction, 0.01 rad/s, is no property of an arm: along simulated motion such friction is fitted as
-    set-valued too, with which a joint sticks. The law with which simulated angles and forces are closer to the recorded ones stands in
-    `model`. Another smoothing is kept.
+    set-valued too, with which a joint sticks. That law stands in `model` where simulated angles and forces are plainly closer to the
+    recorded ones with it. Another smoothing is kept.
 
     Raises
     ------

@@ -5,7 +5,7 @@ use crate::inference::cutoff::best_cutoff;
 use crate::inference::estimate::Identified;
 use crate::inference::multistart::{Ended, best};
 use crate::inference::start::{SHARES, typical};
-use crate::inference::sticking::{misfit, sticking};
+use crate::inference::sticking::{is_plainly_better, sticking};
 use crate::inference::summary::{Fit, summarise};
 use crate::inference::updated_model::{half_way, updated, values};
 use crate::inference::weighted_fit::{Solved, explain, weighted};
@@ -54,7 +54,7 @@ pub struct Options {
     pub cutoff: Option<f64>,
     /// Where the motion comes from.
     pub motion: MotionSource,
-    /// Whether dry friction with the default smoothing is fitted as set-valued too; the law that describes the simulated runs better stands.
+    /// Whether dry friction with the default smoothing is fitted as set-valued too, which stands where it plainly describes the simulated runs better.
     pub may_stick: bool,
     /// What the calibration promises.
     pub tolerance: Tolerance,
@@ -310,15 +310,17 @@ impl<const N: usize> Task<'_, N> {
         })
     }
 
-    /// The fit with set-valued friction from where a fit with smooth friction ended, if it describes the simulated runs better.
+    /// The fit with set-valued friction from where a fit with smooth friction ended, if it plainly describes the simulated runs better.
     fn or_sticking(&self, found: Settled<N>) -> Settled<N> {
-        let misfit = |one: &Settled<N>| {
-            let fitted = (&one.model, self.unknowns, &one.solved.outcome);
-            misfit(fitted, self.fit, (self.cutoff, self.threads))
+        let Some(other) = sticking(&found.model).and_then(|start| self.settle(start).ok()) else {
+            return found;
         };
-        let other = sticking(&found.model).and_then(|start| self.settle(start).ok());
-        match other.map(|other| (misfit(&other), misfit(&found), other)) {
-            Some((Ok(sticking), Ok(smooth), other)) if sticking + AGREED < smooth => other,
+        let fitted = [&other, &found].map(|one| {
+            let delay = delay(self.unknowns, &one.solved.outcome.x);
+            (&one.model, delay)
+        });
+        match is_plainly_better(fitted, self.fit, (self.cutoff, self.threads)) {
+            Ok(true) => other,
             _ => found,
         }
     }

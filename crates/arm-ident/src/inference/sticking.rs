@@ -3,13 +3,11 @@
 //! Torques cannot decide. Where a joint sticks nothing follows from its row, so the set-valued law would be judged by fewer of them.
 
 use arm_core::effect::Effect;
-use arm_numerics::least_squares::outcome::Outcome;
 
 use crate::error::IdentError;
 use crate::regression::measured_motion::low_pass;
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Trial};
-use crate::regression::unknown::{Unknown, delay};
 use crate::threads::parallel;
 
 /// The model with set-valued friction in place of fitted smooth friction whose smoothing speed is the default: that serves an explicit
@@ -32,34 +30,66 @@ fn is_default(effect: &Effect<f64>, parameter: usize) -> bool {
     effect.parameters[parameter] == effect.kind.info().parameters[parameter].default
 }
 
-/// How far simulated runs are from what was measured: twice the negative logarithm of the likelihood of angles and forces, but for a
-/// constant, with the variances that the differences themselves have. What stays the same in a trial, as offsets do, does not count.
+/// Standard deviations by which the set-valued law must describe the trials better on the whole.
+const PLAINLY: f64 = 3.0;
+
+/// Whether the first of two fitted models describes the simulated runs plainly better than the second.
 ///
+/// Twice the logarithm of the ratio of likelihoods of angles and forces is a sum over trials; how it scatters between them tells what is
+/// chance (Vuong 1989). The variances are those that the differences themselves have. What stays the same in a trial, as offsets do, does
+/// not count.
+///
+/// * `fitted` - each model and the delay of its force channels \[s\]
 /// * `cutoff` - of the common low-pass \[Hz\]
 /// * `threads` - over which trials are spread; the result has the same bits for any number
 ///
 /// # Errors
 /// [`IdentError`] for a trial that cannot be simulated or is too short for the filter.
-pub(crate) fn misfit<const N: usize>(
-    (model, unknowns, found): (&Model<N>, &[Unknown], &Outcome),
+pub(crate) fn is_plainly_better<const N: usize>(
+    fitted: [(&Model<N>, f64); 2],
     trials: &[&Trial<N>],
     (cutoff, threads): (f64, usize),
-) -> Result<f64, IdentError> {
-    let delay = delay(unknowns, &found.x);
-    let one = |k: usize| squares(model, trials[k], (cutoff, delay));
-    let mut squares = vec![0.0; N + 2];
-    for own in parallel(threads, trials.len(), one) {
-        for (sum, own) in squares.iter_mut().zip(own?) {
-            *sum += own;
-        }
+) -> Result<bool, IdentError> {
+    let mut logarithms = [Vec::new(), Vec::new()];
+    for ((model, delay), logarithms) in fitted.into_iter().zip(&mut logarithms) {
+        let one = |k: usize| squares(model, trials[k], (cutoff, delay));
+        let own = parallel(threads, trials.len(), one);
+        let own: Vec<Vec<f64>> = own.into_iter().collect::<Result<_, _>>()?;
+        *logarithms = likelihoods(&own, trials, cutoff);
     }
-    let valid = |t: &&Trial<N>| t.valid.iter().filter(|v| **v).count() as f64;
-    let count: f64 = trials.iter().map(valid).sum();
-    let duration: f64 = trials.iter().map(|t| valid(t) / t.rate).sum();
-    // A band has room for so many independent samples.
-    let independent = f64::min(2.0 * cutoff * duration, count);
-    let logarithms = squares.iter().filter(|s| **s > 0.0);
-    Ok(independent * logarithms.map(|s| libm::log(s / count)).sum::<f64>())
+    let [better, worse] = logarithms;
+    let gains: Vec<f64> = std::iter::zip(better, worse).map(|(a, b)| a - b).collect();
+    Ok(is_plain(&gains))
+}
+
+/// Whether a sum is more than [`PLAINLY`] of its standard deviations, which the scatter of its terms tells.
+fn is_plain(gains: &[f64]) -> bool {
+    let count = gains.len() as f64;
+    let sum: f64 = gains.iter().sum();
+    let scatter = |v: &f64| (v - sum / count) * (v - sum / count);
+    let variance = gains.iter().map(scatter).sum::<f64>() * count / (count - 1.0);
+    gains.len() > 1 && sum > PLAINLY * libm::sqrt(variance)
+}
+
+/// Twice the logarithm of the likelihood of each trial, but for a constant.
+fn likelihoods<const N: usize>(
+    squares: &[Vec<f64>],
+    trials: &[&Trial<N>],
+    cutoff: f64,
+) -> Vec<f64> {
+    let valid = |t: &Trial<N>| t.valid.iter().filter(|v| **v).count() as f64;
+    let count: f64 = trials.iter().map(|t| valid(t)).sum();
+    let variances: Vec<f64> = (0..N + 2)
+        .map(|c| squares.iter().map(|own| own[c]).sum::<f64>() / count)
+        .collect();
+    let one = |(own, trial): (&Vec<f64>, &&Trial<N>)| -> f64 {
+        // A band has room for so many independent samples.
+        let independent = f64::min(2.0 * cutoff / trial.rate, 1.0);
+        let channels = std::iter::zip(own, &variances).filter(|(_, v)| **v > 0.0);
+        let each = channels.map(|(square, v)| valid(trial) * libm::log(*v) + square / v);
+        -independent * each.sum::<f64>()
+    };
+    std::iter::zip(squares, trials).map(one).collect()
 }
 
 /// Sums of squares of what simulated angles and forces of a trial differ by from the measured ones, low-passed, without their means.
@@ -101,6 +131,14 @@ mod tests {
     use arm_core::{Chain, Contact, Segment};
 
     use super::*;
+
+    #[test]
+    fn what_the_scatter_between_trials_explains_is_not_plain() {
+        assert!(is_plain(&[3.0, 4.0, 3.0, 2.0, 3.0, 3.0, 4.0, 2.0]));
+        assert!(!is_plain(&[3.0, 9.0, -3.0, 3.0]));
+        assert!(!is_plain(&[50.0]), "one trial tells of no scatter");
+        assert!(!is_plain(&[-3.0, -3.1, -3.0]));
+    }
 
     #[test]
     fn only_the_default_smoothing_of_friction_that_was_found_is_taken_for_none() {

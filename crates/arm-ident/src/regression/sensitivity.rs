@@ -18,11 +18,6 @@ use crate::regression::unknown::{Source, Unknown};
 
 /// Joints that a handle holds; what is left of their freedom is the give of the contact, which is none to speak of.
 pub(crate) const HELD: usize = 2;
-/// Times the stiffness and damping of the contact that the answers have.
-///
-/// An arm of larger masses and a force channel of larger gain differ only in how far the contact gives way. That is a few hundredths of a
-/// millimetre, and the stiffness of the contact is assumed: a fit that used it would read the gain from that assumption.
-const STIFFENED: f64 = 100.0;
 /// Samples a second that follow the arm's own vibrations between the samples of a trial \[Hz\].
 const FINE: f64 = 200.0;
 /// The model from which a fit starts: what the robot does not hold is damped so far that its own vibrations die out as fast as the rows end.
@@ -214,7 +209,7 @@ impl<const N: usize> Answers<'_, N> {
         let through = |gain: Plane<f64>| {
             let mut scaled = jacobian;
             for (axis, gain) in gain.into_iter().enumerate() {
-                scaled.row_mut(axis).scale_mut(gain * STIFFENED);
+                scaled.row_mut(axis).scale_mut(gain);
             }
             jacobian.transpose() * scaled
         };
