@@ -89,14 +89,16 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && a.model.base.is_some() == b.model.base.is_some()
         && a.setup.is_as_commanded() == b.setup.is_as_commanded()
         && a.model.heaves == b.model.heaves
+        && a.model.is_assisted == b.model.is_assisted
         && kinds(a) == kinds(b)
 }
 
-/// Whether two runs are driven in the same way, seen from the base, with the same muscle activity.
+/// Whether two runs are driven in the same way, seen from the base, with the same muscle activity and assistance.
 fn same_drive<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
     a.experiment.drive == b.experiment.drive
         && a.experiment.base == b.experiment.base
         && a.experiment.activity == b.experiment.activity
+        && a.experiment.assistance == b.experiment.assistance
 }
 
 /// The run of a lane. A group of fewer than eight repeats its last one in the lanes left over.

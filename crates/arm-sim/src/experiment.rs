@@ -25,6 +25,8 @@ pub struct Experiment<const N: usize> {
     pub base: Option<Series<2>>,
     /// Activity of the muscles that move each joint, where it was measured; effects that depend on it need it.
     pub activity: Option<Series<N>>,
+    /// Torques on the joints of motors that help the drive \[N m\].
+    pub assistance: Option<Series<N>>,
     /// Where it starts.
     pub start: Start<N>,
     /// Step \[s\], 0.25 ms unless set.
@@ -59,6 +61,7 @@ impl<const N: usize> Experiment<N> {
             robot: None,
             base: None,
             activity: None,
+            assistance: None,
             start: Start::Given {
                 q: Joints::zeros(),
                 qd: Joints::zeros(),

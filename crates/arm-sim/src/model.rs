@@ -29,6 +29,8 @@ pub(crate) struct Model<T, const N: usize> {
     pub base: Option<MovingBase<T>>,
     /// Whether the base also moves by itself, as a function of time.
     pub heaves: bool,
+    /// Whether motors turn the joints of an arm that is held.
+    pub is_assisted: bool,
     /// Where the handle is, unless at the tip.
     pub placement: Option<Placement<T>>,
     pub link: Link<T>,
@@ -98,6 +100,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             chain,
             base: MovingBase::of(setup),
             heaves: !setup.heave.is_still(),
+            is_assisted: false,
             placement: Placement::of(setup),
             link,
             feels_joint_force: effects.iter().any(feels_joint_force),
@@ -123,6 +126,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 if contact.has_no_play()
                     && self.base.is_none()
                     && !self.heaves
+                    && !self.is_assisted
                     && self.placement.is_none()
                     && self.others.is_empty() =>
             {

@@ -49,6 +49,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
         let setup = experiment.altered()?;
         let mut model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
         model.heaves |= experiment.base.is_some();
+        model.is_assisted = experiment.assistance.is_some();
         known(experiment, &schedule)?;
         let motion = reached(experiment, &schedule, 0..schedule.samples());
         let robot = if in_pieces {
@@ -175,7 +176,7 @@ pub(crate) fn commands<const N: usize>(
     with_measured(experiment, &mut out[from..]);
 }
 
-/// Moves the base along its measured path, and sets the activity of muscles, where there is one.
+/// Moves the base along its measured path, sets the activity of muscles and adds the torques of assistance, where there are such.
 #[inline]
 fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input<f64, N>]) {
     if let Some(path) = &experiment.base {
@@ -185,8 +186,13 @@ fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input
         }
     }
     if let Some(activity) = &experiment.activity {
-        for input in inputs {
+        for input in &mut *inputs {
             input.activity = activity.at(input.time).value;
+        }
+    }
+    if let Some(assistance) = &experiment.assistance {
+        for input in inputs {
+            input.torque += Joints::from(assistance.at(input.time).value);
         }
     }
 }
@@ -328,10 +334,13 @@ pub(crate) fn known<const N: usize>(
     let base = base.map(|path| ("the path of the base", (path.start(), path.end())));
     let activity = experiment.activity.as_ref();
     let activity = activity.map(|series| ("the muscle activity", (series.start(), series.end())));
+    let assistance = experiment.assistance.as_ref();
+    let assistance = assistance.map(|series| ("the assistance", (series.start(), series.end())));
+    let others = base.into_iter().chain(activity).chain(assistance);
     let needed = schedule.time(schedule.steps);
     // The last sample may miss the end by rounding.
     let slack = 1e-6 * schedule.dt;
-    for (name, (from, to)) in drive.into_iter().chain(base).chain(activity) {
+    for (name, (from, to)) in drive.into_iter().chain(others) {
         if !(from <= slack && needed <= to + slack) {
             return Err(SimulationError::TooShort {
                 name,

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use arm_core::effect::{Effect, Family, KINDS, Kind, Place};
 use arm_ident::inference::estimate::{Estimate, Identified};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
-use arm_ident::inference::start::{middle, weight_moment};
+use arm_ident::inference::joint_scale::{middle, weight_moment};
 use arm_ident::regression::trial::{Model, Role, Trial};
 use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::extent::extent;

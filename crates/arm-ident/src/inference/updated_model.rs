@@ -62,20 +62,6 @@ fn set_rest(effect: &mut Effect<f64>, rest: usize, torque: f64) {
     }
 }
 
-/// The model half way between two.
-pub(crate) fn half_way<const N: usize>(
-    from: &Model<N>,
-    to: &Model<N>,
-    unknowns: &[Unknown],
-) -> Result<Model<N>, IdentError> {
-    let x: Vec<f64> = values(from, unknowns)
-        .iter()
-        .zip(values(to, unknowns))
-        .map(|(a, b)| 0.5 * (a + b))
-        .collect();
-    updated(from, unknowns, &x)
-}
-
 /// The model's own values of the unknowns, zero for those of the calibration.
 pub(crate) fn values<const N: usize>(model: &Model<N>, unknowns: &[Unknown]) -> Vec<f64> {
     unknowns

@@ -1,5 +1,6 @@
 //! Rows of the linear regression: trials, unknowns, motion, equation of motion, preprocessing.
 
+pub(crate) mod assistance;
 pub mod calibration;
 pub mod equation;
 pub(crate) mod instrument;

@@ -10,6 +10,7 @@ use arm_core::{Joints, Plane, Pose, inertia, inverse_dynamics, jacobian, static_
 use arm_sim::{Change, Recording, Slopes, cubic_weights};
 use nalgebra::SMatrix;
 
+use crate::regression::assistance::Assistance;
 use crate::regression::equation::Building;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
@@ -55,6 +56,8 @@ pub(crate) struct Course<const N: usize> {
     fine: Trial<N>,
     motion: Kinematics<N>,
     parts: usize,
+    /// What helped the joints to move as measured.
+    pub assistance: Option<Assistance<N>>,
 }
 
 impl<const N: usize> Course<N> {
@@ -83,6 +86,7 @@ impl<const N: usize> Course<N> {
             fine,
             motion,
             parts,
+            assistance: None,
         }
     }
 
@@ -213,11 +217,17 @@ impl<const N: usize> Answers<'_, N> {
             }
             jacobian.transpose() * scaled
         };
-        let slopes = Slopes {
+        let mut slopes = Slopes {
             damping: own.damping + through(model.contact.damping),
             stiffness: own.stiffness + through(model.contact.stiffness),
             ..own
         };
+        if let Some(assistance) = &self.course.assistance {
+            for j in 0..N {
+                slopes.damping[(j, j)] += assistance.damping[j];
+                slopes.stiffness[(j, j)] += assistance.stiffness[j];
+            }
+        }
         // At rest, in the first instant, only angles give way.
         let whole = match i {
             0 => stuck_at_start(slopes.stiffness, &self.direct.dry),

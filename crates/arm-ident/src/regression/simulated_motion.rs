@@ -7,19 +7,27 @@
 
 use core::ops::ControlFlow;
 
-use arm_core::Setup;
+use arm_core::effect::Effect;
+use arm_core::{Chain, Joints, Pose, Setup, inertia};
 use arm_sim::{
     Coupling, Drive, Engine, Experiment, HandlePath, Recording, Start, simulate_in_pieces,
 };
 
 use crate::error::IdentError;
+use crate::regression::assistance::Assistance;
 use crate::regression::measured_motion::low_pass;
 use crate::regression::sensitivity::{Course, HELD, parts};
 use crate::regression::trial::{Model, Trial};
 use arm_numerics::NumericsError;
 
 /// Longest simulation step \[s\]; small enough for stiff contacts and smoothed dry friction.
-const LONGEST_STEP: f64 = 0.25e-3;
+pub(crate) const LONGEST_STEP: f64 = 0.25e-3;
+/// Largest rate of decay that a step of the classical fourth-order method follows, times the step.
+pub(crate) const FOLLOWED: f64 = 2.785;
+/// The part of it that a run keeps to where smooth dry friction is steep.
+const SAFELY: f64 = 0.7;
+/// Shortest step, in parts of the longest.
+const MOST_PARTS: f64 = 4.0;
 /// Bandwidth of the handle's path, in bandwidths of the rows. Wider, and noise of the robot's encoders makes a resting arm
 /// creep to and fro, which is read as friction; narrower, and the corners of the path are rounded twice.
 const HANDLE_BAND: f64 = 2.0;
@@ -28,8 +36,10 @@ const HANDLE_BAND: f64 = 2.0;
 const HANDLE_BAND_OF_FREE: f64 = 4.0;
 /// Largest root mean square difference between simulated and measured angles that is still the same movement \[rad\].
 const SAME_MOVEMENT: f64 = 0.15;
+/// The same with an assistance, for an estimate that is no more than the start of the next \[rad\].
+const LIKE_MOVEMENT: f64 = 0.5;
 
-/// The run that the model makes along the handle's path of a trial.
+/// The run that the model makes along the handle's path of a trial, with the help of an assistance if there is one.
 ///
 /// # Errors
 /// [`IdentError`] when the handle's path is not known or something else acts with it, the simulation stops, or it moves elsewhere than the measured arm.
@@ -37,6 +47,7 @@ pub(crate) fn simulated<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
     cutoff: f64,
+    assistance: Option<&Assistance<N>>,
 ) -> Result<Course<N>, IdentError> {
     if trial.base.is_some() {
         return Err(IdentError::MovingBase);
@@ -51,9 +62,18 @@ pub(crate) fn simulated<const N: usize>(
             expected: 1,
         }));
     };
-    let recording = moved(&experiment(model, trial, handle, cutoff)?)?;
-    let course = Course::new(&recording, trial.rate, parts(trial.rate));
+    let mut experiment = experiment(model, trial, handle, cutoff)?;
+    if let Some(assistance) = assistance {
+        assistance.help(&mut experiment, trial, cutoff)?;
+    }
+    let recording = moved(&experiment)?;
+    let mut course = Course::new(&recording, trial.rate, parts(trial.rate));
+    course.assistance = assistance.copied();
     drop(recording);
+    let allowed = match assistance {
+        Some(_) => LIKE_MOVEMENT,
+        None => SAME_MOVEMENT,
+    };
     let mut square = [0.0; N];
     for (simulated, q) in course.angles_at_samples().zip(&trial.q) {
         for j in 0..N {
@@ -62,11 +82,11 @@ pub(crate) fn simulated<const N: usize>(
     }
     for (j, sum) in square.iter().enumerate() {
         let found = libm::sqrt(sum / trial.len() as f64);
-        if found > SAME_MOVEMENT {
+        if found > allowed {
             return Err(IdentError::OtherMovement {
                 joint: j + 1,
                 found,
-                allowed: SAME_MOVEMENT,
+                allowed,
             });
         }
     }
@@ -107,7 +127,12 @@ fn experiment<const N: usize>(
     let interval = 1.0 / trial.rate;
     let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 * interval).collect();
     let parts = parts(trial.rate) as f64;
-    let steps = parts * libm::ceil(interval / parts / LONGEST_STEP);
+    let rates = model.fitted.iter().chain(&model.held);
+    let rate = rates
+        .map(|e| decay_rate(&model.chain, e))
+        .fold(0.0, f64::max);
+    let finer = libm::ceil(rate * LONGEST_STEP / (SAFELY * FOLLOWED)).clamp(1.0, MOST_PARTS);
+    let steps = parts * libm::ceil(interval / parts / LONGEST_STEP * finer);
     let drive = Drive::Handle {
         path: HandlePath::through_points(&times, &points)?,
         coupling: Coupling::Compliant,
@@ -122,4 +147,20 @@ fn experiment<const N: usize>(
     experiment.dt = interval / steps;
     experiment.output_interval = Some(interval / parts);
     Ok(experiment)
+}
+
+/// How fast the slope of smooth dry friction at rest makes the speed of its joint decay, the arm stretched \[1/s\]; zero where it is not smooth, or its
+/// size a share of the force through the joint.
+pub(crate) fn decay_rate<const N: usize>(chain: &Chain<f64, N>, effect: &Effect<f64>) -> f64 {
+    let p = &effect.parameters;
+    match effect.kind.smoothed_by() {
+        Some(smoothing) if p[smoothing] > 0.0 && effect.kind.info().parameters[0].unit == "N m" => {
+            let stretched = inertia(chain, &Pose::new(&Joints::zeros()));
+            let agility = stretched.try_inverse();
+            agility.map_or(0.0, |m| {
+                m[(effect.index, effect.index)] * p[0] / p[smoothing]
+            })
+        }
+        _ => 0.0,
+    }
 }

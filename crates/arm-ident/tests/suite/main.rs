@@ -11,6 +11,7 @@ mod imperfections;
 mod joint;
 mod joint_input;
 mod joint_method;
+mod little_known;
 #[path = "../../../arm-numerics/tests/suite/noise.rs"]
 #[expect(dead_code, reason = "shared with the suite of arm-numerics")]
 mod noise;
