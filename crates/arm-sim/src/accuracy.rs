@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use arm_core::Joints;
 
 use crate::model::Link;
-use crate::prepare::{assemble, link};
+use crate::prepare::model_of;
 use crate::stability::Vibration;
 use crate::{
     Columns, Coupling, Drive, Engine, Experiment, Integrator, Recording, SimulationError, Start,
@@ -169,8 +169,7 @@ impl<const N: usize> Search<N> {
             return Err(setting("output interval", interval, allowed));
         }
         let setup = experiment.altered()?;
-        let link = link(experiment, &setup)?;
-        let model = assemble(&setup, &experiment.effects, link)?;
+        let model = model_of(experiment, &setup)?;
         let (Start::Given { q, .. } | Start::Equilibrium { near: q }) = &experiment.start;
         let largest = match &model.link {
             Link::Compliant(contact) => {

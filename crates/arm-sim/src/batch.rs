@@ -14,7 +14,7 @@ use crate::prepare::{Prepared, commands};
 use crate::recorder::{Instant, Recorder, Row};
 use crate::state::{BaseMotion, Input, Outcome, State};
 use crate::step::{Inputs, Memory, step};
-use crate::{Experiment, Handle, Integrator, Recording, SimulationError, simulate};
+use crate::{Assistance, Experiment, Handle, Integrator, Recording, SimulationError, simulate};
 use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Runs in one group.
@@ -173,6 +173,10 @@ impl<'a, const N: usize> Group<'a, N> {
             (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
         let mut model = Model::new(&setup, pack_link(lane, setup.contact), effects.collect())?;
         model.heaves = first.model.heaves;
+        let assistance = pack_assistance(|i| lane(i).experiment.assistance.as_ref());
+        if let Some([stiffness, damping]) = assistance {
+            model.assist(stiffness, damping);
+        }
         Ok(Self {
             prepared,
             plain: model.plain(),
@@ -498,6 +502,17 @@ fn pack_input<const N: usize>(input: impl Fn(usize) -> Input<f64, N>) -> Input<W
         },
         activity: core::array::from_fn(|j| pack(|i| inputs[i].activity[j])),
     }
+}
+
+/// Stiffness and damping of the lanes' assistance, which they all have or none has.
+fn pack_assistance<'a, const N: usize>(
+    assistance: impl Fn(usize) -> Option<&'a Assistance<N>>,
+) -> Option<[[Wide; N]; 2]> {
+    assistance(0)?;
+    let of = |read: fn(&Assistance<N>) -> &[f64; N]| {
+        core::array::from_fn(|j| pack(|i| assistance(i).map_or(0.0, |a| read(a)[j])))
+    };
+    Some([of(|a| &a.stiffness), of(|a| &a.damping)])
 }
 
 fn pack_wave<'a>(wave: impl Fn(usize) -> &'a Wave<f64>) -> Wave<Wide> {

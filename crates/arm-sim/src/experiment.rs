@@ -25,8 +25,8 @@ pub struct Experiment<const N: usize> {
     pub base: Option<Series<2>>,
     /// Activity of the muscles that move each joint, where it was measured; effects that depend on it need it.
     pub activity: Option<Series<N>>,
-    /// Torques on the joints of motors that help the drive \[N m\].
-    pub assistance: Option<Series<N>>,
+    /// What pulls the joints towards given angles beside the drive.
+    pub assistance: Option<Assistance<N>>,
     /// Where it starts.
     pub start: Start<N>,
     /// Step \[s\], 0.25 ms unless set.
@@ -39,6 +39,25 @@ pub struct Experiment<const N: usize> {
     pub output_interval: Option<f64>,
     /// What is recorded of each sample, [`Columns::All`] unless set.
     pub columns: Columns,
+}
+
+/// A spring and a damper in every joint that pull towards an angle that moves, `K (q_d − q) + D (q̇_d − q̇)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assistance<const N: usize> {
+    /// The angles q_d \[rad\].
+    pub towards: Series<N>,
+    /// K \[N m/rad\].
+    pub stiffness: [f64; N],
+    /// D \[N m s/rad\].
+    pub damping: [f64; N],
+}
+
+impl<const N: usize> Assistance<N> {
+    /// `K q_d + D q̇_d` at a time \[N m\]; the rest is in the model.
+    pub(crate) fn torque(&self, time: f64) -> Joints<f64, N> {
+        let to = self.towards.at(time);
+        Joints::from_fn(|j, _| self.stiffness[j] * to.value[j] + self.damping[j] * to.rate[j])
+    }
 }
 
 /// What is recorded of each sample.

@@ -44,7 +44,9 @@ pub use batch::simulate_batch;
 pub use controlled::{Controlled, Controller, Fault, control};
 pub use digest::{Digest, definite, digest, digest_of};
 pub use error::{NoRest, SimulationError};
-pub use experiment::{Columns, Coupling, Drive, Experiment, Integrator, Start, altered};
+pub use experiment::{
+    Assistance, Columns, Coupling, Drive, Experiment, Integrator, Start, altered,
+};
 pub use interaction::{Interaction, Law, Support, Yielded, interact};
 pub use linearized::{Change, Slopes};
 pub use movement::{JointMotion, Movement};

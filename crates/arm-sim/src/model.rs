@@ -29,7 +29,7 @@ pub(crate) struct Model<T, const N: usize> {
     pub base: Option<MovingBase<T>>,
     /// Whether the base also moves by itself, as a function of time.
     pub heaves: bool,
-    /// Whether motors turn the joints of an arm that is held.
+    /// Whether an assistance pulls at the joints of an arm that is held.
     pub is_assisted: bool,
     /// Where the handle is, unless at the tip.
     pub placement: Option<Placement<T>>,
@@ -111,6 +111,15 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             dry,
             effects,
         })
+    }
+
+    /// Puts springs and dampers of an assistance in the joints; the angles that they pull towards are in the input.
+    pub fn assist(&mut self, stiffness: [T; N], damping: [T; N]) {
+        self.is_assisted = true;
+        for (j, terms) in self.affine.iter_mut().enumerate() {
+            terms[1] += stiffness[j];
+            terms[2] += damping[j];
+        }
     }
 
     /// Whether nothing in it bends or jumps: no dry friction, no play, no effect but those linear in the motion of their joint.

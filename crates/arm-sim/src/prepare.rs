@@ -47,9 +47,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
         let schedule = Schedule::of(experiment)?;
         refuse_unknown_activity(&experiment.effects, experiment.activity.is_some())?;
         let setup = experiment.altered()?;
-        let mut model = assemble(&setup, &experiment.effects, link(experiment, &setup)?)?;
-        model.heaves |= experiment.base.is_some();
-        model.is_assisted = experiment.assistance.is_some();
+        let model = model_of(experiment, &setup)?;
         known(experiment, &schedule)?;
         let motion = reached(experiment, &schedule, 0..schedule.samples());
         let robot = if in_pieces {
@@ -192,7 +190,7 @@ fn with_measured<const N: usize>(experiment: &Experiment<N>, inputs: &mut [Input
     }
     if let Some(assistance) = &experiment.assistance {
         for input in inputs {
-            input.torque += Joints::from(assistance.at(input.time).value);
+            input.torque += assistance.torque(input.time);
         }
     }
 }
@@ -238,6 +236,19 @@ impl<const N: usize> Computation for Abreast<'_, N> {
             }));
         }
     }
+}
+
+/// The model of an experiment whose effects have been applied to its rig.
+pub(crate) fn model_of<const N: usize>(
+    experiment: &Experiment<N>,
+    setup: &Setup<f64, N>,
+) -> Result<Model<f64, N>, SimulationError> {
+    let mut model = assemble(setup, &experiment.effects, link(experiment, setup)?)?;
+    model.heaves |= experiment.base.is_some();
+    if let Some(assistance) = &experiment.assistance {
+        model.assist(assistance.stiffness, assistance.damping);
+    }
+    Ok(model)
 }
 
 /// The model of a rig whose effects have been applied.
@@ -298,7 +309,7 @@ fn check<const N: usize>(setup: &Setup<f64, N>) -> Result<(), SimulationError> {
 }
 
 /// How the tip of an experiment is held.
-pub(crate) fn link<const N: usize>(
+fn link<const N: usize>(
     experiment: &Experiment<N>,
     setup: &Setup<f64, N>,
 ) -> Result<Link<f64>, SimulationError> {
@@ -334,7 +345,7 @@ pub(crate) fn known<const N: usize>(
     let base = base.map(|path| ("the path of the base", (path.start(), path.end())));
     let activity = experiment.activity.as_ref();
     let activity = activity.map(|series| ("the muscle activity", (series.start(), series.end())));
-    let assistance = experiment.assistance.as_ref();
+    let assistance = experiment.assistance.as_ref().map(|a| &a.towards);
     let assistance = assistance.map(|series| ("the assistance", (series.start(), series.end())));
     let others = base.into_iter().chain(activity).chain(assistance);
     let needed = schedule.time(schedule.steps);

@@ -5,7 +5,6 @@
 //! next with a weaker assistance, until there is none: a homotopy (Vyasarayani, Uchida, Carvalho and McPhee 2011, Parameter identification in
 //! dynamic systems using the homotopy optimization approach).
 
-use arm_core::effect::{Effect, Kind};
 use arm_core::{Joints, Pose, inertia};
 use arm_sim::{Experiment, Interpolation, Series};
 
@@ -50,25 +49,19 @@ impl<const N: usize> Assistance<N> {
         cutoff: f64,
     ) -> Result<(), IdentError> {
         let filter = low_pass((BAND * cutoff).min(0.4 * trial.rate), trial.rate)?;
-        let mut torques = vec![[0.0; N]; trial.len()];
+        let mut angles = vec![[0.0; N]; trial.len()];
         for j in 0..N {
-            let angles: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();
-            let angles = filter.both_ways(&angles)?;
-            let last = angles.len() - 1;
-            for (i, torque) in torques.iter_mut().enumerate() {
-                let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
-                let speed = (angles[after] - angles[before]) * trial.rate / (after - before) as f64;
-                torque[j] = self.stiffness[j] * angles[i] + self.damping[j] * speed;
+            let measured: Vec<f64> = trial.q.iter().map(|q| q[j]).collect();
+            for (angles, smooth) in angles.iter_mut().zip(filter.both_ways(&measured)?) {
+                angles[j] = smooth;
             }
         }
         let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 / trial.rate).collect();
-        let series = Series::new("the assistance", &times, &torques, Interpolation::Cubic)?;
-        experiment.assistance = Some(series);
-        for j in 0..N {
-            let spring = Effect::new(Kind::Elastic, j).with(&[self.stiffness[j], 0.0]);
-            let damper = Effect::new(Kind::Viscous, j).with(&[self.damping[j]]);
-            experiment.effects.extend([spring, damper]);
-        }
+        experiment.assistance = Some(arm_sim::Assistance {
+            towards: Series::new("measured angles", &times, &angles, Interpolation::Cubic)?,
+            stiffness: self.stiffness,
+            damping: self.damping,
+        });
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod activity;
+mod assistance;
 mod batch;
 mod chosen_step;
 mod common;
