@@ -63,7 +63,7 @@ impl Default for Options {
     }
 }
 
-/// Identifies a model on the trials whose role is [`Role::Fit`]; the others are only explained.
+/// Identifies a model on the trials whose role is [`Role::Fit`](crate::regression::trial::Role::Fit); the others are only explained.
 ///
 /// # Errors
 /// [`IdentError`] when there is nothing to fit on or with, a trial is too short for the filter, or no solution exists.
