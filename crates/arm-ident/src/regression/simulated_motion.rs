@@ -2,8 +2,7 @@
 //!
 //! Differentiated camera angles make dry friction and viscosity unreadable: the sign and size of a resting joint's speed
 //! are noise. The simulated arm is led by the robot's own angles, which are known far better (an instrument in the sense
-//! of Janot, Vandanjon, Gautier 2014). Measured angles stay on the right-hand side, see
-//! [`instrument`](crate::regression::instrument).
+//! of Janot, Vandanjon, Gautier 2014). Measured angles stay on the right-hand side, see the module `instrument`.
 
 use core::ops::ControlFlow;
 
