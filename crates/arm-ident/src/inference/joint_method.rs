@@ -133,12 +133,12 @@ pub fn identify<const N: usize>(
 }
 
 /// The better end of two fits; of two that failed the second, as the first started from the model as given.
-fn better<T, const N: usize>(
-    one: Result<(T, Settled<N>), IdentError>,
-    other: Result<(T, Settled<N>), IdentError>,
-) -> Result<(T, Settled<N>), IdentError> {
+fn better<const N: usize>(
+    one: Result<Settled<N>, IdentError>,
+    other: Result<Settled<N>, IdentError>,
+) -> Result<Settled<N>, IdentError> {
     match (one, other) {
-        (Ok(one), Ok(other)) if other.1.better_than(&one.1) => Ok(other),
+        (Ok(one), Ok(other)) if other.better_than(&one) => Ok(other),
         (Ok(one), _) => Ok(one),
         (Err(_), other) => other,
     }
@@ -153,22 +153,23 @@ impl<const N: usize> Task<'_, N> {
     ) -> Result<(Self, Settled<N>, Option<IdentError>), IdentError> {
         let measured = || self.by_measured(model, options.cutoff);
         let certain = |(task, found)| (task, found, None);
-        let concluded = |(task, found): (Self, _)| match options.may_stick {
-            true => (task, task.or_sticking(found)),
-            false => (task, found),
-        };
         let asked = options.motion;
         if asked == MotionSource::Measured
             || asked == MotionSource::Auto && !self.fit.iter().all(|t| can_simulate(t))
         {
             return measured().map(certain);
         }
-        let mut best = self.by_simulation(model, options.cutoff);
-        if !best.as_ref().is_ok_and(|(_, found)| self.done(found)) {
+        let task = self.simulating(options.cutoff);
+        let mut best = task.settle(damped(model, task.cutoff));
+        if !best.as_ref().is_ok_and(|found| self.done(found)) {
             // An arm of which little is known moves elsewhere than its model, and a fit along a motion that is not the arm's may end in the
             // wrong minimum.
-            best = better(best, self.by_fading(model, options.cutoff));
+            best = better(best, task.faded(model));
         }
+        let concluded = |found| match options.may_stick {
+            true => (task, task.or_sticking(found)),
+            false => (task, found),
+        };
         match best.map(concluded) {
             Err(error) if asked == MotionSource::Auto => {
                 measured().map(|(task, found)| (task, found, Some(error)))
@@ -198,28 +199,11 @@ impl<const N: usize> Task<'_, N> {
         Ok((self, found))
     }
 
-    /// The fit along simulated motion. That is not bent by the filter: the lowest cutoff keeps out most noise.
-    fn by_simulation(
-        mut self,
-        from: &Model<N>,
-        cutoff: Option<f64>,
-    ) -> Result<(Self, Settled<N>), IdentError> {
+    /// The task along simulated motion. That is not bent by the filter: the lowest cutoff keeps out most noise.
+    fn simulating(mut self, cutoff: Option<f64>) -> Self {
         self.simulate = true;
         self.cutoff = cutoff.unwrap_or(self.cutoff);
-        let found = self.settle(damped(from, self.cutoff))?;
-        Ok((self, found))
-    }
-
-    /// The fit along simulated motion with an assistance that fades.
-    fn by_fading(
-        mut self,
-        from: &Model<N>,
-        cutoff: Option<f64>,
-    ) -> Result<(Self, Settled<N>), IdentError> {
-        self.simulate = true;
-        self.cutoff = cutoff.unwrap_or(self.cutoff);
-        let found = self.faded(from)?;
-        Ok((self, found))
+        self
     }
 
     /// The end of fits whose assistance fades.
