@@ -14,7 +14,7 @@ use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::trial_specific::component::{TrialSpecific, shapes_of};
 use crate::trial_specific::spectral_line::SpectralLine;
-use arm_numerics::signal::spectrum::{Sum, line};
+use arm_numerics::signal::spectrum::{Sum, line, peak};
 
 /// Where a line is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +84,32 @@ impl<const N: usize> PreparedSession<'_, N> {
         };
         let lines = sums.iter().filter_map(|sum| line(&all, rate, lowest, *sum));
         let named = |frequency: f64| self.swinging_at(frequency, (point, &residuals));
-        Ok(lines.filter_map(named).next())
+        let found = lines.filter_map(named).next();
+        Ok(found.map(|found| self.at_the_peak(found, (point, &residuals))))
+    }
+
+    /// What swings, at the frequency at which the residuals have their peak if it explains more there: where tip and handle come apart, a rhythm
+    /// of muscles hardly shows.
+    fn at_the_peak(
+        &self,
+        found: TrialSpecific,
+        (point, residuals): (&LinearizationPoint<N>, &[Channels]),
+    ) -> TrialSpecific {
+        let all: Vec<&Channels> = residuals.iter().collect();
+        let rate = self.courses[self.fitted[0]].rate;
+        let shortest = all.iter().map(|r| r[0].len()).min().unwrap_or(1);
+        let sum = if found.locked {
+            Sum::Swings
+        } else {
+            Sum::Powers
+        };
+        // The width of a line over a trial.
+        let near = (found.wave()[0], rate / shortest as f64);
+        let again = peak(&all, rate, near, sum)
+            .and_then(|frequency| self.swinging_at(frequency, (point, residuals)));
+        again
+            .filter(|again| again.gain > found.gain)
+            .unwrap_or(found)
     }
 
     /// What swings at a frequency, where it is plain enough.

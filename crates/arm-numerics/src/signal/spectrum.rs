@@ -127,17 +127,30 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Opti
         }
     }
     let (_, near) = best?;
+    peak(trials, rate, (near, step), sum)
+}
+
+/// The frequency near another at which all channels together have most power \[Hz\]; `None` without trials.
+///
+/// * `near` - that frequency, and how far from it is looked \[Hz\]: no further than the width of a line
+pub fn peak(
+    trials: &[&Vec<Vec<f64>>],
+    rate: f64,
+    (near, apart): (f64, f64),
+    sum: Sum,
+) -> Option<f64> {
+    let channels = trials.first()?.len();
+    let of_channel = |c: usize| trials.iter().map(|t| tapered(&t[c])).collect();
+    let all: Vec<Vec<Vec<f64>>> = (0..channels).map(of_channel).collect();
     let square = |t: &Vec<f64>| t.iter().map(|v| v * v).sum::<f64>();
-    let size = |c: usize| trials.iter().map(|t| square(&t[c])).sum::<f64>();
-    let sizes: Vec<f64> = (0..channels)
-        .map(|c| size(c).max(f64::MIN_POSITIVE))
-        .collect();
+    let size = |channel: &Vec<Vec<f64>>| channel.iter().map(square).sum::<f64>();
+    let sizes: Vec<f64> = all.iter().map(|c| size(c).max(f64::MIN_POSITIVE)).collect();
     // The peak of all channels together, on a finer grid.
     let total = |f: f64| -> f64 {
         let share = |(channel, size): (&Vec<_>, &f64)| sum.power(channel, (f, rate)) / size;
         std::iter::zip(&all, &sizes).map(share).sum()
     };
-    let fine = 0.1 * step;
+    let fine = 0.1 * apart;
     let around = (-10..=10).map(|k| near + fine * f64::from(k));
     let (most, peak) = around
         .map(|f| (total(f), f))
