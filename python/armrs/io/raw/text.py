@@ -67,19 +67,14 @@ def decoded_lines(path: Path) -> tuple[list[str], str]:
     return [line for line in re.split(r"\r\n|\r|\n", content) if line.strip()], encoding
 
 
-def read_text_table(path: Path) -> RawTable:
-    """Read a text table.
+def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
+    """Return the table in a text, from the lines and encoding of `decoded_lines`.
 
     Raises
     ------
     BadInput
         When no block of numbers is found. Without the file's name in it; the caller adds it.
     """
-    return table_of(path, *decoded_lines(path))
-
-
-def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
-    """Return the table in a text, from what `decoded_lines` returned; errors as in `read_text_table`."""
     leading = next((index for index, line in enumerate(lines) if not _is_comment(line)), len(lines))
     lines = [_THOUSANDS.sub("", line) for line in lines]
     lines = [line for index, line in enumerate(lines) if index == 0 or not _is_comment(line) or _may_name(index, leading, line)]
