@@ -223,38 +223,6 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         priors
     }
 
-    /// The arm and the effects with values in place of the unknowns.
-    ///
-    /// Of a chain only base parameters are known; the masses stay as they are, and centres of mass and inertias are
-    /// moved so that the base parameters come out. Their gravity and motion are exact, the force in a bearing is not.
-    pub fn with_values(&self, values: &[T; P]) -> (Chain<T, N>, [Effect<T>; E]) {
-        let (mut chain, mut effects) = (self.chain, self.effects);
-        let mut next = values.iter();
-        for second in [false, true] {
-            for j in 0..N {
-                let Some(&value) = next.next() else { continue };
-                let s = &mut chain.segments[j];
-                if second {
-                    s.inertia += value - chain.j[j];
-                    chain.j[j] = value;
-                } else {
-                    let along = s.com[0] + (value - chain.x[j]) / s.mass;
-                    s.inertia += s.mass * (s.com[0].squared() - along.squared());
-                    s.com[0] = along;
-                    chain.x[j] = value;
-                }
-            }
-        }
-        // What is linear comes first.
-        for effect in effects.iter_mut().filter(|e| e.on) {
-            let count = linear(effect).count();
-            for (value, &new) in effect.parameters.iter_mut().take(count).zip(&mut next) {
-                *value = new;
-            }
-        }
-        (chain, effects)
-    }
-
     /// The states of the effects one period later, the motion taken as constant in it.
     /// No period and no speed makes a state run away, see [`advance_states`].
     pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [States<T>; E], period: T) {
