@@ -283,12 +283,6 @@ impl Noise {
         row
     }
 
-    /// Whitens channels that are thinned already.
-    pub fn whiten_thinned(&self, thinned: &Thinned) -> Vec<f64> {
-        let whitening = self.whitening_at(thinned.observed());
-        self.rows(thinned.channels.clone(), &whitening)
-    }
-
     /// The rows of channels at the samples of a whitening, made white there: each channel by itself, then free of what it shares with
     /// those before it.
     pub fn rows(&self, mut rows: Channels, whitening: &Whitening) -> Vec<f64> {
@@ -441,7 +435,9 @@ mod tests {
         let noise = Noise::of(&series, &[], &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
         for c in 0..CHANNELS {
             let squares = series.iter().map(|s| {
-                let sum: f64 = noise.whiten_thinned(s)[c * N..(c + 1) * N].iter().sum();
+                let whitening = noise.whitening_at(s.observed());
+                let rows = noise.rows(s.channels.clone(), &whitening);
+                let sum: f64 = rows[c * N..(c + 1) * N].iter().sum();
                 sum * sum / N as f64
             });
             let variance = squares.sum::<f64>() / series.len() as f64;

@@ -56,19 +56,6 @@ pub struct Explained<const N: usize> {
     pub fitted: Vec<Joints<f64, N>>,
 }
 
-impl<const N: usize> Explained<N> {
-    /// Sum of squared residuals and number of samples, for each joint.
-    pub fn square_sum(&self) -> ([f64; N], usize) {
-        let mut sum = [0.0; N];
-        for (m, f) in self.measured.iter().zip(&self.fitted) {
-            for j in 0..N {
-                sum[j] += (m[j] - f[j]) * (m[j] - f[j]);
-            }
-        }
-        (sum, self.measured.len())
-    }
-}
-
 /// The result of an identification.
 #[derive(Clone, Debug)]
 pub struct Identified<const N: usize> {

@@ -190,23 +190,6 @@ impl RankReport {
         };
         Ok(self.trades().iter().map(line).collect())
     }
-
-    /// The determined combinations in words, one line per base column: "m1*l1 + 0.322 m2".
-    ///
-    /// # Errors
-    /// [`NumericsError::Length`](arm_numerics::NumericsError::Length) unless there is one name a column.
-    pub fn describe_combinations(&self, names: &[&str]) -> Result<Vec<String>, IdentError> {
-        check_len("names", names.len(), self.scale.len())?;
-        let line = |combination: &Combination| {
-            let mut text = names[combination.base].to_owned();
-            for &(index, c) in &combination.others {
-                let sign = if c < 0.0 { '-' } else { '+' };
-                text = format!("{text} {sign} {} {}", short(c.abs()), names[index]);
-            }
-            text
-        };
-        Ok(self.combinations.iter().map(line).collect())
-    }
 }
 
 /// Four significant digits, no trailing zeros.
