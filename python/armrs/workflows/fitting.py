@@ -28,8 +28,8 @@ class SimulationFit(Framed):
     Attributes
     ----------
     values, sd : dict of str to float
-        Estimate of every free parameter and its standard deviation, if the noise is white and as large as was said; in the
-        parameter's own unit. Infinite where the record is silent.
+        Estimate of every free parameter and its standard deviation, if the noise is white and as large as stated; in the
+        parameter's own unit. Infinite where the record does not determine it.
     at_bound : tuple of str
         Parameters that a bound holds.
     residual_rms : float

@@ -21,8 +21,8 @@ use crate::data::passive_law::{Free, LIKELY, Passive};
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::measurement_model::prediction::Course;
 
-/// Noise of a joint's speed, as a share of the speed, above which the motion is simulated: what measured motion tells of that joint is
-/// noise. Below it is nearer than a simulation that lacks what is to be found.
+/// Noise of a joint's speed, as a share of the speed, above which the motion is simulated, as the measured motion of that joint is
+/// mostly noise. Below, measured motion is closer than a simulation without the missing effects.
 const NOISY: f64 = 0.3;
 /// Standard deviation of a rest angle about the middle of the angles that were reached \[rad\].
 const REST_SD: f64 = 1.0;
@@ -89,7 +89,7 @@ impl<const N: usize> Session<N> {
             if let Some(smoothing) = law.kind.smoothed_by()
                 && self.comparison == ComparisonMode::Led
             {
-                // A joint that rests sticks, until the data say otherwise.
+                // A resting joint sticks, unless the data contradict.
                 passive.effect.parameters[smoothing] = 0.0;
             }
             let size = law.parameters[0];
@@ -122,8 +122,8 @@ impl<const N: usize> Session<N> {
         self
     }
 
-    /// The first fit trials of each movement. The search starts from what these tell and refits it with all; two tell what repeats differ
-    /// by, and to simulate all of them again and again would take longer than the search.
+    /// The first fit trials of each movement. The search starts from their fit and refits it with all; two give the scatter of
+    /// repeats, and repeated simulation of all of them would take longer than the search.
     fn first_repeats(&self) -> Vec<Trial<N>> {
         /// Of each movement.
         const REPEATS: usize = 2;
@@ -146,7 +146,7 @@ impl<const N: usize> Session<N> {
         (found, model): (&Identified<N>, &Model<N>),
     ) -> Vec<WithStd> {
         let shows = |(law, std): &WithStd| law.parameters[0] > LIKELY * std;
-        // Differentiated once, and only where a joint asks for it.
+        // Differentiated once, and only where a joint needs it.
         let moving = LazyCell::new(|| in_motion(&self.trials, found.cutoff).unwrap_or_default());
         for own in laws.chunk_by_mut(|(a, _), (b, _)| a.index == b.index) {
             let mut dry = own.iter().filter(|(l, _)| l.kind.smoothed_by().is_some());
@@ -215,8 +215,8 @@ impl<const N: usize> Session<N> {
         })
     }
 
-    /// Which joints stay where they are but for noise, or move as if in tar: what looks like a viscosity far above any other is friction that
-    /// holds the joint nearly all the time.
+    /// Which joints are at rest except for noise, or have a viscosity far above the usual ones, which is friction that holds the joint
+    /// nearly all the time.
     fn hardly_moving(&self, laws: &[WithStd]) -> [bool; N] {
         let mut still = self.reach().map(|reach| reach <= STILL);
         for (law, _) in laws {
@@ -228,8 +228,8 @@ impl<const N: usize> Session<N> {
         still
     }
 
-    /// Makes of a law of a joint that hardly moves what holds it: friction that sticks, larger than any torque that it must hold. How
-    /// large it is cannot be told, nor anything else of the joint.
+    /// Replaces the law of a joint that hardly moves by sticking friction, larger than any torque that it must hold. Its size cannot
+    /// be determined, nor any other law of the joint.
     fn hold(&self, passive: &mut Passive) {
         passive.likely = passive.effect.is_dry();
         let holding = self.weight_moment(0);
@@ -237,7 +237,7 @@ impl<const N: usize> Session<N> {
         passive.free.clear();
     }
 
-    /// Laws of joints that are held, which no data can tell.
+    /// Laws of joints that are held, which the data cannot determine.
     pub fn hidden_laws(&self) -> Vec<Effect<f64>> {
         let hidden = self.base.iter().filter(|law| law.free.is_empty());
         hidden.map(|law| law.effect).collect()

@@ -10,9 +10,9 @@ pub(super) const LIKELY: f64 = 2.0;
 pub struct Passive {
     /// The law as it was identified from measured motion.
     pub effect: Effect<f64>,
-    /// Its numbers that are fitted.
+    /// Its fitted parameters.
     pub free: Vec<Free>,
-    /// Whether measured motion shows it; the others are asked again once something is named.
+    /// Whether measured motion shows it; the others are tested again once an effect is named.
     pub likely: bool,
 }
 

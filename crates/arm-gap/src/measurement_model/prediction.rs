@@ -378,7 +378,7 @@ pub fn away_from_gaps(valid: &[bool], margin: usize) -> Vec<bool> {
 
 /// Motion of the joints from measured angles, and from measured speeds only where the angles are too noisy for it.
 ///
-/// A controller's speed is the derivative of its angles behind a filter that nobody knows. What it is late by works against viscous
+/// A controller's speed is the derivative of its angles behind an unknown filter. Its delay counteracts viscous
 /// friction: 0.8 ms take all damping away from a pendulum of 0.3 m that rings for a minute.
 fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, GapError> {
     let mut angles = trial.clone();

@@ -176,7 +176,7 @@ mod tests {
         assert!((told[2].value - 0.1).abs() < 1e-12 && (told[2].promised - 0.1).abs() < 1e-12);
         assert_eq!(told[2].unit, RELATIVE);
 
-        // Nothing is far; then the place of the robot is as far as is allowed, and alone is told.
+        // No value is at its limit; then the place of the robot is, and alone is reported.
         assert_eq!(stopped(&model, &hypothesis, unknowns.iter()), None);
         let mut bounded = unknowns;
         (bounded[0].upper, bounded[1].upper) = (0.02, 0.003);

@@ -9,7 +9,7 @@ pub struct TrialFile {
     pub end: f64,
 }
 
-/// What a search was asked about, as the files have it.
+/// The input of a search, in the terms of the files.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<'a> {
     /// The model as given.

@@ -46,7 +46,7 @@ pub struct GapResult {
     pub places: Vec<Place>,
     /// The gap of each channel on the test trials.
     pub gap: Named<ChannelGap>,
-    /// What was asked for and not named.
+    /// Candidates that were not named.
     pub would_have_seen: Vec<Limit>,
     /// Share of what the calibrated model left beyond noise that is still there.
     pub unexplained: f64,
@@ -58,7 +58,7 @@ pub struct GapResult {
     pub lack: [Lack; 2],
     /// Rounds of the search.
     pub search_trace: Vec<SearchStep>,
-    /// What a reader should know of the data.
+    /// Remarks on the data.
     pub warnings: Vec<String>,
     /// The model with the named effects, everything refitted.
     pub model: Model,
@@ -253,7 +253,7 @@ impl Serialize for GapResult {
     }
 }
 
-/// What a first look shows, in the terms of the files.
+/// Result of the first-order screening, in the terms of the files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Screening {
     /// Segments, contact and known effects refitted.
@@ -269,7 +269,7 @@ pub struct Screening {
 }
 
 impl Screening {
-    /// What a first look found, in the terms of the files.
+    /// Converts the result of the first-order screening to the terms of the files.
     ///
     /// # Errors
     /// [`Refused`] where a refitted value is none that a model may have.

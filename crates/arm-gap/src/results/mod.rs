@@ -31,7 +31,7 @@ use arm_model::Site;
 /// Values by name, in their order.
 pub type Named<T> = indexmap::IndexMap<String, T>;
 
-/// Name of a kind, joint or segment from 1, and channel, of what the core knows by an index.
+/// Name of a kind, joint or segment from 1, and channel, from the index in the core.
 fn placed(kind: Kind, index: usize) -> (String, Option<usize>, Option<String>) {
     let name = kind.info().kind.to_owned();
     match Site::of(kind, index) {

@@ -45,7 +45,7 @@ pub struct SimulatedTrial {
     pub test: bool,
     /// Sampling rate \[Hz\].
     pub rate: f64,
-    /// Samples over which a gap is measured, and which tell by how much repeats differ: not those that a disturbance has touched.
+    /// Samples over which a gap and the scatter of repeats are measured: not those that a disturbance affects.
     pub counted: Vec<bool>,
     /// Measured channels.
     pub measured: Channels,

@@ -34,7 +34,7 @@ pub struct Finding<const N: usize> {
     pub precision: Precision,
     /// Lack of fit of the calibrated and of the amended model.
     pub lack: [LackOfFit; 2],
-    /// What else was asked.
+    /// The other candidates.
     pub ruled: Vec<Ruled>,
     /// Misfit for each degree of freedom.
     pub scale: f64,
@@ -53,7 +53,7 @@ struct Known<const N: usize> {
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// Judges the passive base, and measures what is left.
+    /// Selects the laws of the passive base, and measures what is left.
     pub(crate) fn concluded(
         &mut self,
         (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
@@ -112,8 +112,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
-    /// Judges the base, and what is named beside it once more where that changes: a spring over two joints that is named brings back the
-    /// springs of both joints, and what had stood for them is left over.
+    /// Selects the laws of the base, and tests the other named effects again where the base changes: a named spring over two joints brings
+    /// back the springs of both joints, and the effects that had replaced them become redundant.
     fn judged_with_base(
         &mut self,
         (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
@@ -191,7 +191,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The amended model refitted with the noise of all fitted trials, and how well it is known then.
     ///
-    /// Of slow noise the differences of few repeats hold few independent samples, and what they say of it is what they happen to.
+    /// Of slow noise, the differences of few repeats hold few independent samples, so its estimate from them is uncertain.
     fn weighed_by_what_is_left(
         &mut self,
         (amended, point): (&Fitted<N>, LinearizationPoint<'a, N>),
@@ -238,7 +238,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 }
 
-/// Whether the named effects and the laws of the base that are dropped are those that were judged.
+/// Whether the named effects and the dropped laws of the base are those of the last selection.
 fn is_as_judged(found: &(Vec<Candidate>, Vec<bool>), now: &(Vec<Candidate>, Vec<bool>)) -> bool {
     let same = |(a, b): (&Candidate, &Candidate)| a.is_same_question(b);
     found.1 == now.1 && found.0.len() == now.0.len() && std::iter::zip(&found.0, &now.0).all(same)
@@ -287,7 +287,7 @@ fn rhythms_of(trial_specific: &[TrialSpecific]) -> Vec<Effect<f64>> {
     rhythms.map(|a| a.effect).collect()
 }
 
-/// Says what share of all that is explained is lost without each effect, and sorts by it.
+/// Computes the share of all that is explained that is lost without each effect, and sorts by it.
 ///
 /// * `explained` - what all of them explain, in units of twice the log-likelihood; infinite where nothing can be simulated without
 ///   them

@@ -1,4 +1,4 @@
-//! A first look: what calibration takes away, and what each kind of the catalogue would explain to first order.
+//! Screening before the search: the effect of calibration, and what each kind of the catalogue would explain to first order.
 
 use arm_core::effect::Effect;
 
@@ -14,7 +14,7 @@ use crate::selection::score_test::ScoreTest;
 use crate::selection::search_state::Progress;
 use crate::trial_specific::tremor_detection::Line;
 
-/// What a first look shows; nothing in it was converged by simulation but the calibration.
+/// Result of the screening; only the calibration was converged by simulation.
 #[derive(Clone, Debug)]
 pub struct Look<const N: usize> {
     /// The model after refitting what was never exact.
@@ -43,7 +43,7 @@ pub struct Suspect {
 }
 
 impl<const N: usize> PreparedSession<'_, N> {
-    /// Calibrates, and asks every candidate alone to first order.
+    /// Calibrates, and tests every candidate alone to first order.
     ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.

@@ -1,7 +1,7 @@
-//! The passive base of an arm in the simulation: which of the laws that measured motion suggests it needs, and which of them are named.
+//! The passive base of an arm in the simulation: which of the laws suggested by measured motion it needs, and which of them are named.
 //!
-//! The closed chain is simulated with the base that was identified from measured motion. Its numbers stay free with every question,
-//! and are judged last.
+//! The closed chain is simulated with the base that was identified from measured motion. Its parameters stay free with every candidate,
+//! and its laws are selected last.
 
 use arm_core::effect::{Effect, Kind, Place};
 use arm_ident::regression::unknown::spring;
@@ -31,7 +31,7 @@ const TURNS: usize = 4;
 pub(crate) struct BaseLaw<const N: usize> {
     /// Its place in the base.
     pub base: usize,
-    /// The question that it answers.
+    /// Its candidate.
     pub question: Candidate,
     /// Square of its first parameter in standard deviations.
     pub gain: f64,
@@ -85,8 +85,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(terms.into_iter().map(with_law).collect())
     }
 
-    /// The dry law of the base in a joint, with how much worse a fitted hypothesis does without it. A joint that sticks answers far from in
-    /// proportion to its friction, so that standard deviations do not tell what it explains.
+    /// The dry law of the base in a joint, with how much worse a fitted hypothesis does without it. The response of a sticking joint is far from
+    /// proportional to its friction, so standard deviations do not give what it explains.
     pub(crate) fn gain_of_dry_law(
         &self,
         point: &LinearizationPoint<N>,
@@ -145,9 +145,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.with_friction_at_rest(settled)
     }
 
-    /// Asks for the laws of the base once more that were dropped before anything was named: what was named since may have hidden them. They
-    /// start as measured motion has them; where much is left all laws do, as a joint that sticks can lead a fit far astray. `None` where
-    /// none comes back and nothing is gained.
+    /// Tests the laws of the base again that were dropped before anything was named, as an effect named since may have hidden them. They
+    /// start at their values from measured motion; so do all laws where much is left, as a sticking joint can make a fit diverge. `None`
+    /// where none comes back and nothing is gained.
     pub(crate) fn with_base_revived(
         &mut self,
         current: &Fitted<N>,
@@ -263,8 +263,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.measure_noise(&anchor)
     }
 
-    /// Judges the base once everything is named: laws that do not earn their names are dropped one after the other and the rest is
-    /// refitted; what stands in better for one takes its place; what does as well is its alternative.
+    /// Selects the laws of the base once everything is named: laws below their price are dropped one after the other and the rest is
+    /// refitted; an effect that explains more replaces a law; one that explains as much is its alternative.
     ///
     /// # Errors
     /// As [`PreparedSession::settle`].
@@ -303,7 +303,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.dropped[base] = true;
             match self.settle(better.hypothesis, better.asked) {
                 Ok(exchanged) => settled = exchanged,
-                // What can be followed but not simulated is no answer.
+                // A solution that can be followed but not simulated is refused.
                 Err(_) => {
                     self.dropped[base] = false;
                     return Ok((settled, laws));
@@ -390,7 +390,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(laws)
     }
 
-    /// Looks for what could stand in the place of a law of the base, which is the last of the named effects.
+    /// Searches for effects that could replace a law of the base, which is the last of the named effects.
     fn judge_base_law(
         &self,
         law: &mut BaseLaw<N>,
@@ -401,7 +401,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let slot = fitted.asked.len() - 1;
         let mut less = fitted.hypothesis.clone();
         less.named.pop();
-        // Of what cannot be followed without it nothing can be said.
+        // Where the run cannot be followed without it, its gain is unknown.
         let Ok(less) = self.fit(point, less, fitted.asked[..slot].to_vec()) else {
             return;
         };
@@ -422,7 +422,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let own = (&law.question, law.gain);
         law.better = rivals
             .iter()
-            // A law that few joints have is asked beside the base, and does not take its place.
+            // A law that few joints have is tested beside the base, and does not replace it.
             .filter(|r| r.alternative.candidate.kind().prior().passive)
             .find(|r| self.takes_over(&r.alternative, own, 0.0))
             .map(|r| r.fitted.clone());

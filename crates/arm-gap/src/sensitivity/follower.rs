@@ -96,7 +96,7 @@ impl<const N: usize> Linear<'_, N> {
     }
 }
 
-/// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
+/// Increments of angle \[rad\] and speed \[rad/s\] for difference quotients.
 const NUDGE: (f64, f64) = (1e-7, 1e-5);
 
 /// How far angles, speeds and accelerations of another plant are from those of the run.
@@ -219,7 +219,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         }
     }
 
-    /// Makes a step; what the equation of motion says at its end, and whether it is solved.
+    /// Makes a step; the balance of the equation of motion at its end, and whether it is solved.
     pub fn step(
         &mut self,
         instant: &Instant<N>,

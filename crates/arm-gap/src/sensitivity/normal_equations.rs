@@ -1,4 +1,4 @@
-//! Normal equations, trial by trial: what every question is answered from.
+//! Normal equations, trial by trial, from which every candidate is tested.
 
 use std::sync::Arc;
 
@@ -146,7 +146,7 @@ pub fn solve(
 mod tests {
     use super::*;
 
-    /// Numbers between -1 and 1 that look random.
+    /// Pseudo-random numbers between -1 and 1.
     fn numbers(seed: u64, count: usize) -> Vec<f64> {
         let mut state = seed;
         (0..count)

@@ -136,9 +136,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         (explained, scale * scatter.unwrap_or(1.0))
     }
 
-    /// Whether what is asked can have happened in a trial: it deviates from all repeats by more than any of them does. Of two both deviate
-    /// alike, and the disturbed one is further from the model. And what hardly shows in the samples that are left, or in a joint that
-    /// sticks, would have to be larger than anything.
+    /// Whether a disturbance is possible in a trial: the trial deviates from all repeats by more than any of them does. Two trials deviate
+    /// alike, and the disturbed one is further from the model. A disturbance with little effect on the compared samples, or in a joint that
+    /// sticks, would have to be larger than its limit.
     fn is_possible(&self, one: &Asked, suspect: &Compared) -> bool {
         let own = dot(&one.row, &suspect.own);
         let others: Vec<f64> = suspect.others.iter().map(|o| dot(&one.row, o)).collect();
@@ -156,8 +156,8 @@ impl<const N: usize> PreparedSession<'_, N> {
         is_furthest && one.size(&suspect.deviation).abs() < largest
     }
 
-    /// Whether what is asked is a finding in a trial: what moves within what the calibration promises of it is none, nor what dry friction
-    /// may hold.
+    /// Whether a disturbance is a finding in a trial: not if it is within the tolerance of the calibration, or if dry friction
+    /// may hold it.
     ///
     /// * `effects` - of the model that is compared
     fn is_finding(&self, one: &Asked, suspect: &Compared, effects: &[Effect<f64>]) -> bool {

@@ -155,7 +155,7 @@ fn within(starts: usize) -> std::ops::Range<usize> {
     10..starts.saturating_sub(10)
 }
 
-/// A disturbance that is asked for, with what it would show.
+/// A candidate disturbance, with its response.
 #[derive(Clone)]
 pub(super) struct Asked {
     /// Its size is one, in the direction that explains most.
@@ -283,7 +283,7 @@ impl Explained {
 /// place.
 ///
 /// * `deviation` - what the trial differs from its repeats by
-/// * `answer` - what it would show
+/// * `answer` - its response
 pub(super) fn timed(
     mut best: Asked,
     deviation: &[f64],
@@ -329,7 +329,7 @@ pub(super) fn timed(
 
 /// How much more than noise the shape of a disturbance finds at other times of its movement, as a ratio of variances; at least one.
 ///
-/// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like disturbances at many times.
+/// Joints that stick elsewhere in every repeat, and noise that differs from the autoregression, resemble disturbances at many times.
 ///
 /// * `one` - as it stands among `asked`
 /// * `deviations` - of the trial and its repeats, without what the disturbance itself explains: an arm rings long after a burst, and what
@@ -337,7 +337,7 @@ pub(super) fn timed(
 pub(super) fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[Vec<f64>]) -> f64 {
     /// Nine of ten squares of a standard normal number are smaller.
     const NINE_OF_TEN: f64 = 2.706;
-    /// How long a burst is felt around it, and a slip about its start \[s\].
+    /// Duration of the response around a burst, and around the start of a slip \[s\].
     const RESPONSE_TIME: f64 = 1.0;
     let (start, duration) = one.timing();
     let long = duration.unwrap_or(0.0);

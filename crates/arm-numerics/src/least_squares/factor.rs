@@ -1,4 +1,4 @@
-//! The triangular factor of a least-squares problem: everything the data say, in `p(p+3)/2 + 1` numbers.
+//! The triangular factor of a least-squares problem: sufficient statistics of the data, `p(p+3)/2 + 1` numbers.
 
 use crate::error::{NumericsError, check_finite, check_len};
 use crate::linalg::matrix::{Matrix, dot};

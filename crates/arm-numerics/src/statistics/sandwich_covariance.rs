@@ -152,9 +152,9 @@ pub fn blocks(n: usize, shortest: usize) -> Result<Vec<Range<usize>>, NumericsEr
         .collect())
 }
 
-/// Share of the prior's variance that the data removed, `1 − posterior/prior`, between 0 (nothing learnt) and 1.
+/// Share of the prior's variance that the data removed, `1 − posterior/prior`, between 0 (no information) and 1.
 ///
-/// It says what the data **and the priors of the other parameters** imply: a parameter in the null space can have a large ratio. Read it with
+/// It measures the information of the data **and of the priors of the other parameters**: a parameter in the null space can have a large ratio. Read it with
 /// `RankReport::undetermined_share` of `arm-ident`.
 ///
 /// # Errors
