@@ -1,4 +1,4 @@
-//! Literature values of the segments of the arm, as first guesses and as priors.
+//! Literature values of the segments of the arm, as initial values and as priors.
 //!
 //! * de Leva, P. (1996), Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters, J. Biomech. 29, table 4:
 //!   means of 100 young men (73.0 kg, 1.741 m) and 15 young women (61.9 kg, 1.735 m), between joint centres.

@@ -152,7 +152,7 @@ impl Muscle {
     }
 }
 
-/// What `dataset.toml` says of one trial.
+/// One trial in `dataset.toml`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TrialEntry {
     /// Its file, below the folder of the data set.

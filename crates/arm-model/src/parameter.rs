@@ -468,7 +468,7 @@ impl Model {
                     let effects = self.joints[k].effects(k);
                     effects.iter().find(|e| e.kind() == kind)?.value(parameter)
                 }
-                // A joint has its keys whether they say something or not.
+                // A joint has its keys whether they are set or not.
                 None if nth == 0 => self.joints.get(index)?.value(kind, parameter),
                 None => None,
             },
@@ -524,7 +524,7 @@ impl Model {
         Self::new(parts)
     }
 
-    /// The same model with other effects in its joints: those that a joint's keys can say stand there, the others are listed
+    /// The same model with other effects in its joints: those that a joint's keys can express stand there, the others are listed
     /// before `others`.
     ///
     /// # Errors
@@ -551,7 +551,7 @@ impl Model {
     }
 }
 
-/// Changes a parameter of an effect that a joint's keys state; what they cannot say takes the effect to the list.
+/// Changes a parameter of an effect that a joint's keys state; a value that they cannot express moves the effect to the list.
 fn change_joint(
     parts: &mut Parts,
     index: usize,

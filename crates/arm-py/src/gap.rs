@@ -32,7 +32,7 @@ pub struct Settings {
     tolerance: Py<model::Tolerance>,
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
-    /// What the samples of each trial weigh; see [`Session::weights`].
+    /// Weights of the samples of each trial; see [`Session::weights`].
     weights: Vec<f64>,
     threads: usize,
     /// Names of user-defined kinds that are tested besides the catalogue.
@@ -138,7 +138,7 @@ pub fn play(
         let files: Vec<&str> = call.trials.iter().map(|c| c.file.as_str()).collect();
         let one = |i: usize| {
             let course = Arc::new(session.course(i)?);
-            // What cannot be simulated is told of below, with its trial.
+            // A trial that cannot be simulated is reported below.
             let believed = match own {
                 true => session.in_trial((&given, &[]), &course).ok(),
                 false => None,
@@ -201,7 +201,7 @@ pub fn find_gap(
     each_short_length!(&rig.arm.chain, c => run(py, c, &call, progress.as_ref()))
 }
 
-/// Calibrates a model, and asks every candidate alone to first order; see `armrs.gap.calibrate`.
+/// Calibrates a model, and tests every candidate alone to first order; see `armrs.gap.calibrate`.
 #[pyfunction]
 #[pyo3(signature = (rig, trials, settings, progress=None))]
 pub fn look(

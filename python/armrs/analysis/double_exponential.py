@@ -92,7 +92,7 @@ class Shape:
 
 
 class Problem:
-    """Moments of trials less their means, which differ from trial to trial and say nothing of the shape.
+    """Moments of trials less their means, which differ from trial to trial and do not belong to the shape.
 
     Where shared errors count, what they may do is taken out of moments and law alike: with `Z` what they do and `σ` the noise,
     `‖W r‖² = min_b ‖r − Z b‖² + σ² ‖b‖²`.
@@ -142,7 +142,7 @@ class Problem:
 
         The test of the scores of both ratios by flipping the signs of each trial's share (Hemerik, Goeman, Finos 2020), the scores freed
         from what the other numbers explain. It needs no model of the noise, and holds where trials scatter differently. An exponential that
-        is not there is asked with the expected steepness.
+        is not there is tested with the expected steepness.
         """
         values = shape.values.copy()
         absent = values[:2] == 0.0

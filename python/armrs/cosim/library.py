@@ -153,7 +153,7 @@ class Library:
 
 
 def _folder(resources: Path | None) -> c_char_p:
-    # The standard wants a separator at the end.
+    # The standard requires a separator at the end.
     return c_char_p(None if resources is None else os.fsencode(f"{resources}{os.sep}"))
 
 

@@ -71,7 +71,7 @@ def driven(model: Model, drive: Movement | Trial | None, coupling: str) -> CoreD
 
 
 def about(drive: Movement | Trial | None, error: BadInput, more: str = "") -> BadInput:
-    """Return a refusal of the core with the file of the drive, where it is about how that leads the arm; `more` is added to one of its length."""
+    """Return a refusal of the core with the file of the drive, where it is about how that leads the arm; `more` is for its length."""
     if drive is None:
         return error
     if error.place == "duration":

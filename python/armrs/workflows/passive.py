@@ -297,7 +297,7 @@ def passive_moments(
     """Compute the passive moment of every joint in slow movements, and its elastic and dissipative parts.
 
     `tau_p = J(q)^T F_on_arm - G(q) - B(q) qdd - C(q, qd) qd`, plus joint torques where they were measured: equation 3.18 of the thesis
-    with the force on the arm. The thesis neglects inertial torques; here they are subtracted by the model, and a check states where they are
+    with the force on the arm. The thesis neglects inertial torques; here they are subtracted by the model; a check states where they are
     not small. Only the rigid arm of the model counts, with what was worn, and none of its effects.
 
     Parameters

@@ -251,7 +251,7 @@ def forecast(
     The closed chain is simulated, noise of the sensors is carried through the rows of the regression and the prior of the
     model, as `identify` would have them. Nothing is measured: what the model lacks is not in it. Over 200 repetitions with two
     segments the scatter was 0.90 to 1.09 of the deviations; over 100 with three, where the robot does not hold every joint, 0.84 to
-    1.03, which such numbers of repetitions determine to 5 and 7 % (`scripts/check_plan.py 200` and `100 300 3 601`). With three segments and
+    1.03, accurate to 5 and 7 % with so many repetitions (`scripts/check_plan.py 200` and `100 300 3 601`). With three segments and
     five repeats two deviations of the hand's first moment are 2.1 % of it and of its second moment 4.9 %. With ten they are 1.5 and
     3.5 %: of 200 repetitions 95 % were within 1.6 and 3.5 %, and the scatter was 0.97 to 1.17 of the deviations.
 

@@ -22,7 +22,7 @@ pub struct Prior {
     pub passive: bool,
 }
 
-/// Effects of one mechanism, of which movements may not tell the members apart.
+/// Effects of one mechanism, whose members may be indistinguishable by movements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Dry friction.
@@ -121,7 +121,7 @@ pub struct Part {
     pub varying: &'static [usize],
     /// What is known of a shape, where something is: its position, expected value and standard deviation.
     pub expected: &'static [(usize, [f64; 2])],
-    /// Change of a size that is small and yet seen; zero where the size of the torque tells it.
+    /// Small change of a size that is still visible; zero where it follows from the size of the torque.
     pub small: f64,
 }
 

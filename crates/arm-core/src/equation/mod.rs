@@ -76,7 +76,7 @@ impl<T: Scalar, const N: usize, const P: usize> Needed<T, N, P> {
         self.torque_of(|i| unknowns[i])
     }
 
-    /// The same of values that are asked for by the number of the unknown.
+    /// The same of values by the number of the unknown.
     #[inline]
     pub(crate) fn torque_of(&self, unknown: impl Fn(usize) -> T) -> Joints<T, N> {
         let mut sums = self.known;
@@ -171,7 +171,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         self.used
     }
 
-    /// What the arm as given says of its unknowns: base parameters from masses, centres of mass and inertias that are
+    /// Priors of the unknowns from the arm as given: base parameters from masses, centres of mass and inertias that are
     /// each uncertain by a relative standard deviation, effects about their values and otherwise open.
     pub fn priors(&self, uncertainty: T) -> [Prior<T>; P] {
         let infinite = T::of(f64::INFINITY);
@@ -224,7 +224,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     }
 
     /// The states of the effects one period later, the motion taken as constant in it.
-    /// No period and no speed makes a state run away, see [`advance_states`].
+    /// A state stays bounded at any period and speed, see [`advance_states`].
     pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [States<T>; E], period: T) {
         if self.remembers {
             advance_states(&self.effects, (motion, motion), memory, period);

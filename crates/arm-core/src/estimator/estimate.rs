@@ -1,4 +1,4 @@
-//! What an estimator says of the unknowns, and of itself.
+//! Estimates of the unknowns, and the state of an estimator.
 
 use super::sample::SampleStatus;
 use crate::equation::Prior;

@@ -24,7 +24,7 @@ _WORKBOOK = b"\xd0\xcf\x11\xe0"
 _COMMENT = ("#", "%", "//", '"#')
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", " ": "blanks"}
 _PROBED = 400
-"""Lines in which header, separator and decimal mark are looked for."""
+"""Lines in which header, separator and decimal mark are searched for."""
 _NAMING = 3
 """Comment lines above the samples that may hold groups, names and units of the columns."""
 _FEWEST = 3
@@ -198,7 +198,7 @@ def _is_units(row: list[str]) -> bool:
 def _columns(
     lines: list[str], names: list[str], units: list[str], layout: _Layout, notes: list[str]
 ) -> tuple[list[RawColumn], list[Remark]]:
-    """Return the columns of numbers, and what the columns that hold words alone say."""
+    """Return the columns of numbers, and the contents of columns that hold words alone."""
     import pyarrow as pa
     from pyarrow import csv
 

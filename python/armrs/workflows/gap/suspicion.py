@@ -132,7 +132,7 @@ def _still_joints(dataset: Dataset, led: bool) -> list[str]:
 
 
 def _copies(dataset: Dataset, led: bool) -> list[str]:
-    """Refuse a trial whose samples are those of another, or of its start: such repeats give no estimate of noise, and such a test trial is no test."""
+    """Refuse a trial whose samples are those of another, or of its start: such repeats show no noise, and such a test is none."""
     known: dict[bytes, list[Trial]] = {}
     for trial in dataset.trials:
         # Comparing those alone that start alike is cheap for many trials and long ones.

@@ -109,7 +109,7 @@ def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
 
     Notes
     -----
-    In one slow movement, a delay and a viscosity are hardly distinguishable. All recordings share the laws of the joints; and one shift holds for all,
+    In one slow movement, a delay resembles a viscosity. All recordings share the laws of the joints; and one shift holds for all,
     as where one trigger starts both devices, if that explains the torques about as well. Where both seem to be on one clock, they are
     if that explains the torques about as well. A movement that repeats itself may have been taken a period off; so the shift of every
     recording is tried for all. Shifts are compared on the samples that have forces at both: what a longer shift leaves out, such as a

@@ -131,7 +131,7 @@ def _handle_system(hand: np.ndarray, qr: np.ndarray) -> np.ndarray:
 
 
 def _solved(systems: Sequence[np.ndarray]) -> tuple[np.ndarray, int, np.ndarray]:
-    """Return the least squares of all trials, how many parameters are determined, and the distance (root mean square) left in each trial [m]."""
+    """Return the least squares of all trials, the number of determined parameters, and the distance (RMS) left in each trial [m]."""
     rows = np.concatenate(systems)
     found, _, rank, _ = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=_TOLD)
     left = [np.sqrt(2.0 * np.mean((s[:, :-1] @ found - s[:, -1]) ** 2)) for s in systems]
