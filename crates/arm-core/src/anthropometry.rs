@@ -63,7 +63,7 @@ pub enum Grip {
 
 /// A value and its standard deviation among people.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct Expected {
     /// Expected value.
     pub value: f64,
     /// Standard deviation.
@@ -76,11 +76,11 @@ pub struct SegmentPrior {
     /// Length, measured or scaled \[m\].
     pub length: f64,
     /// Mass \[kg\].
-    pub mass: Estimate,
+    pub mass: Expected,
     /// Centre of mass from the proximal joint \[m\].
-    pub com: Estimate,
+    pub com: Expected,
     /// Moment of inertia about the centre of mass \[kg m²\].
-    pub inertia: Estimate,
+    pub inertia: Expected,
 }
 
 impl SegmentPrior {
@@ -139,9 +139,9 @@ const fn sample_height(sex: Sex) -> f64 {
 struct Line([f64; 4]);
 
 impl Line {
-    fn at(&self, subject: &Subject, unit: f64) -> Estimate {
+    fn at(&self, subject: &Subject, unit: f64) -> Expected {
         let [b0, b1, b2, sd] = self.0;
-        Estimate {
+        Expected {
             value: unit * (b0 + b1 * subject.body_mass + b2 * 100.0 * subject.height),
             sd: unit * sd,
         }
@@ -196,10 +196,10 @@ impl Subject {
     /// Mass of a segment by de Leva's percentage \[kg\].
     ///
     /// The standard deviation is that of Zatsiorsky's men relative to their mean, for both sexes: de Leva states none.
-    pub fn mass(&self, part: Part) -> Estimate {
+    pub fn mass(&self, part: Part) -> Expected {
         let value = self.body_mass * shape(part, self.sex).mass / 100.0;
         let [mean, sd] = RELATIVE_MASS[part as usize];
-        Estimate {
+        Expected {
             value,
             sd: value * sd / mean,
         }
@@ -248,11 +248,11 @@ impl Subject {
         Ok(SegmentPrior {
             length,
             mass: self.mass(part),
-            com: Estimate {
+            com: Expected {
                 value: length * shape(part, self.sex).com,
                 sd: COM_SD[part as usize],
             },
-            inertia: Estimate {
+            inertia: Expected {
                 value: inertia,
                 sd: inertia * typical.sd / typical.value,
             },
@@ -263,7 +263,7 @@ impl Subject {
     ///
     /// Segments of the regressions end at bony landmarks and not at joint centres, so that they differ somewhat from de
     /// Leva's. For small people they can become negative.
-    pub fn regressed_inertia(&self, part: Part, axis: Axis) -> Option<Estimate> {
+    pub fn regressed_inertia(&self, part: Part, axis: Axis) -> Option<Expected> {
         (self.sex == Sex::Male).then(|| INERTIA[part as usize][axis as usize].at(self, 1e-4))
     }
 }

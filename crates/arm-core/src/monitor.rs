@@ -300,11 +300,6 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         self.stop = None;
     }
 
-    /// The channels and their limits.
-    pub fn channels(&self) -> &[Channel<T>; C] {
-        &self.channels
-    }
-
     fn fault(
         &mut self,
         times: [u64; 2],

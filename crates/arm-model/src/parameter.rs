@@ -204,19 +204,6 @@ fn own(object: Object, name: &str) -> Option<&'static Entry> {
 }
 
 impl ParameterId {
-    /// A parameter of an effect: of the first of its kind at its place.
-    ///
-    /// # Errors
-    /// [`Refused`] for a parameter that the kind does not have.
-    pub fn of_effect(effect: &Effect, parameter: &str) -> Result<Self, Refused> {
-        Self::in_effect(
-            Object::of(effect.kind(), effect.site()),
-            effect.kind(),
-            0,
-            parameter,
-        )
-    }
-
     fn in_effect(object: Object, kind: Kind, nth: usize, parameter: &str) -> Result<Self, Refused> {
         let known = kind.info().parameters;
         match known.iter().find(|p| p.name == parameter) {

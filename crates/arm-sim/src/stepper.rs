@@ -148,7 +148,6 @@ pub struct Seen<const N: usize> {
 pub struct Stepper<const N: usize> {
     setup: Setup<f64, N>,
     model: Model<f64, N>,
-    port: Port,
     dt: f64,
     state: State<f64, N>,
     memory: Memory<f64>,
@@ -203,7 +202,6 @@ impl<const N: usize> Stepper<N> {
         Ok(Self {
             setup,
             model,
-            port,
             dt,
             state,
             memory,
@@ -248,11 +246,6 @@ impl<const N: usize> Stepper<N> {
     ) -> Result<Joints<f64, N>, SimulationError> {
         self.apply(outside, 0.0);
         start::equilibrium(&self.model, &self.input(outside), near)
-    }
-
-    /// Which port this is.
-    pub fn port(&self) -> Port {
-        self.port
     }
 
     /// Number of effects, and so of those whose states are in a snapshot.

@@ -158,10 +158,6 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     pub fn effects(&self) -> &[Effect<T>; E] {
         &self.effects
     }
-    /// Whether an effect depends on the forces through the joints; otherwise they need not be computed.
-    pub fn feels_force(&self) -> bool {
-        self.feels_force
-    }
     /// Whether some effect has states of its own, which [`Equation::advance`] carries on.
     pub fn remembers(&self) -> bool {
         self.remembers

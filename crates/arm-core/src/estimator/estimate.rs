@@ -62,9 +62,4 @@ impl<T: Real> Estimate<T> {
             decided_by: Decision::Prior,
         }
     }
-
-    /// The interval of so many standard deviations, cut at the bounds.
-    pub fn interval(&self, deviations: T, prior: &Prior<T>) -> [T; 2] {
-        [-deviations, deviations].map(|k| (self.value + k * self.sd).max(prior.min).min(prior.max))
-    }
 }

@@ -161,10 +161,6 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     pub fn estimates(&self) -> &[Estimate<T>; P] {
         &self.estimates
     }
-    /// Their values.
-    pub fn values(&self) -> [T; P] {
-        self.estimates.map(|e| e.value)
-    }
 
     /// How much larger the standard deviations are than the noise that was declared would make them: by residuals that are
     /// larger, and by neighbouring ones that resemble each other. Never below one.

@@ -257,11 +257,6 @@ impl Noise {
         move |channels| self.rows(valid_segments.pick(channels), &whitening)
     }
 
-    /// Whitens a set of channels at the samples of a trial.
-    pub fn whiten(&self, channels: &Channels, valid_segments: &ValidSegments) -> Vec<f64> {
-        self.white_at(valid_segments)(channels)
-    }
-
     /// Whitens a set of channels of one trial, whose samples weigh as they do there.
     ///
     /// * `whitening` - of the samples

@@ -225,7 +225,7 @@ fn laws_of_the_base_are_likely_where_measured_motion_shows_them() {
         panic!("{none:?}");
     };
     assert_eq!((rest.sd, size.step), (1.0, 0.01 * size.sd));
-    // The model has a law: nothing is asked of its joints.
+    // The model has a law: nothing is added to its joints.
     assert!(quiet().with_base(1).base.is_empty());
 }
 
@@ -281,11 +281,10 @@ fn noise_is_measured_where_movements_are_repeated() {
     let prepared = PreparedSession::new(&session, 1).expect("a sound session");
     assert!(prepared.repeated);
     let point = prepared.linearize(&session.given()).expect("a run");
-    // The model is the truth: what is left of each trial is as large as the noise says.
+    // The model is the truth: the residuals of each trial are as large as the noise.
     for (place, &trial) in prepared.fitted.iter().enumerate() {
-        let rows = prepared
-            .noise
-            .whiten(&point.residuals[place], &prepared.valid_segments[trial]);
+        let rows =
+            prepared.noise.white_at(&prepared.valid_segments[trial])(&point.residuals[place]);
         let square = rows.iter().map(|v| v * v).sum::<f64>() / rows.len() as f64;
         assert!((0.5..2.0).contains(&square), "trial {trial}: {square}");
     }
@@ -311,7 +310,7 @@ fn once_the_data_are_explained_noise_is_read_off_all_trials() {
     let mean = |prepared: &PreparedSession<2>| {
         let rows = fitted.residuals.iter().zip(&prepared.fitted);
         let rows = rows.flat_map(|(left, &trial)| {
-            let all = prepared.noise.whiten(left, &prepared.valid_segments[trial]);
+            let all = prepared.noise.white_at(&prepared.valid_segments[trial])(left);
             all[all.len() / 2..].to_vec()
         });
         let (sum, count) = rows.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
@@ -417,7 +416,7 @@ fn samples_at_which_a_joint_with_dry_friction_rests_are_not_compared() {
     assert_eq!((prepared.dry, without.dry), ([false, true], [false; 2]));
     let rows = |p: &PreparedSession<2>| p.valid_segments[0].rows_per_channel(4);
     let (own, all) = (rows(&prepared), rows(&without));
-    // Two joints: the force still tells the component that no torque of the elbow changes.
+    // Two joints: the component of the force that no torque of the elbow changes is still observable.
     assert_eq!(own[..3], all[..3]);
     assert!(own[3] < all[3] && own[3] > 0, "{own:?} {all:?}");
     let joints = |q: &Joints<f64, 2>| q.iter().all(|v| v.is_finite());

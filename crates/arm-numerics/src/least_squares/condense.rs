@@ -64,11 +64,6 @@ impl Condenser {
         }
     }
 
-    /// Number of parameters `p`.
-    pub fn parameters(&self) -> usize {
-        self.p
-    }
-
     /// Number of rows pushed so far.
     pub fn rows(&self) -> usize {
         self.rows

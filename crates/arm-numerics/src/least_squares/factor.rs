@@ -65,19 +65,6 @@ impl Factor {
         Ok(self.r.transpose_times(&e))
     }
 
-    /// The same problem in `x̃` with `x = S x̃`.
-    ///
-    /// # Errors
-    /// [`NumericsError::Length`], [`NumericsError::NotFinite`].
-    pub fn scaled(&self, scale: &[f64]) -> Result<Self, NumericsError> {
-        check_len("scale", scale.len(), self.parameters())?;
-        check_finite("scale", scale)?;
-        Ok(Self {
-            r: self.r.scaled_columns(scale),
-            ..self.clone()
-        })
-    }
-
     /// Refuses a factor whose public fields do not fit together.
     pub(crate) fn check(&self) -> Result<(), NumericsError> {
         check_len("r", self.r.cols(), self.z.len())?;

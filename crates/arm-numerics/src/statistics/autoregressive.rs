@@ -165,11 +165,6 @@ impl Whitener {
         Ok(Self { predictors })
     }
 
-    /// Whitens one column of one trial in place.
-    pub fn apply(&self, column: &mut [f64]) {
-        whiten(column, |t| self.next(t));
-    }
-
     /// The order of the model.
     pub fn order(&self) -> usize {
         self.predictors.len() - 1
@@ -221,17 +216,6 @@ impl Whitener {
             covariance.push(next.fold(0.0, |sum, (i, a)| sum + a * covariance[lag - 1 - i]));
         }
         covariance
-    }
-}
-
-/// Subtracts from each sample what is predicted of it, and scales the rest.
-fn whiten<'a>(column: &mut [f64], predictor: impl Fn(usize) -> &'a Predictor) {
-    // Backwards, so that every sample still finds its unfiltered past.
-    for t in (0..column.len()).rev() {
-        let (a, inverse) = predictor(t);
-        let past = a.iter().enumerate();
-        let predicted = past.fold(0.0, |sum, (i, a)| sum + a * column[t - 1 - i]);
-        column[t] = (column[t] - predicted) * inverse;
     }
 }
 
