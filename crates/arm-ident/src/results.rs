@@ -50,7 +50,7 @@ pub struct TrialName {
 
 /// The input of an identification, in the terms of the files.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct IdentificationInput<'a> {
     /// The model as given.
     pub model: &'a Model,
     /// Every effect that was taken into account.
@@ -123,7 +123,7 @@ impl Identification {
     /// [`Refused`] where an estimate is none that a model may have.
     pub fn of<const N: usize>(
         result: &estimate::Identified<N>,
-        asked: &Asked<'_>,
+        asked: &IdentificationInput<'_>,
     ) -> Result<Self, Refused> {
         let not_simulated = result.not_simulated.as_ref();
         let trials: Vec<_> = result.explained.iter().zip(asked.trials).collect();
@@ -221,7 +221,7 @@ const ROUNDING: f64 = 1e-12;
 fn identified_model<const N: usize>(
     chain: &Chain<f64, N>,
     fitted: &[CoreEffect<f64>],
-    asked: &Asked<'_>,
+    asked: &IdentificationInput<'_>,
 ) -> Result<Model, Refused> {
     let model = asked.model;
     let fitted: Vec<Effect> = fitted.iter().map(Effect::from_core).collect();

@@ -8,7 +8,7 @@ use arm_gap::GapError;
 use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::results as core;
-use arm_gap::results::{Asked, TrialFile, Version};
+use arm_gap::results::{SearchInput, TrialFile, Version};
 use arm_gap::selection::model_discrimination::Contest;
 use arm_ident::threads::parallel;
 use pyo3::exceptions::PyException;
@@ -88,8 +88,8 @@ impl<'a, 'py> Call<'a, 'py> {
         self.trials.iter().map(file).collect()
     }
 
-    fn asked<'s>(&'s self, trials: &'s [TrialFile]) -> Asked<'s> {
-        Asked {
+    fn asked<'s>(&'s self, trials: &'s [TrialFile]) -> SearchInput<'s> {
+        SearchInput {
             model: self.settings.model.get().inner(),
             force_on_robot: self.settings.force_on_robot,
             trials,

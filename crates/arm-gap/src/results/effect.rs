@@ -2,10 +2,10 @@ use arm_core::effect::{Effect as CoreEffect, Kind, Place as ActsOn};
 use arm_model::Effect;
 use serde::Serialize;
 
-use super::{Asked, Named, Value, at_most, placed};
+use super::{Named, SearchInput, Value, at_most, placed};
 use crate::measurement_model::hypothesis::Target;
 use crate::selection::conclusion::Finding;
-use crate::selection::model_selection::{self, Alternative as Fitted, TIE};
+use crate::selection::model_selection::{self, FittedAlternative, TIE};
 use crate::trial_specific::component::TrialSpecific;
 
 /// A movement that would distinguish two explanations.
@@ -71,7 +71,7 @@ fn how_well(worse: f64) -> &'static str {
 }
 
 impl Alternative {
-    fn of(fitted: &Fitted) -> Self {
+    fn of(fitted: &FittedAlternative) -> Self {
         let (worse, likeness) = (fitted.worse, fitted.likeness);
         Self {
             free: fitted.candidate.free.clone(),
@@ -142,9 +142,9 @@ fn sign_in_files(kind: Kind, force_on_robot: bool) -> f64 {
 impl Missing {
     /// A named effect of all trials.
     pub(super) fn named<const N: usize>(
-        named: &model_selection::Named,
+        named: &model_selection::NamedEffect,
         finding: &Finding<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Self {
         let effect = &finding.amended.hypothesis.named[named.slot];
         let info = effect.kind.info();
@@ -186,7 +186,7 @@ impl Missing {
     pub(super) fn trial_specific<const N: usize>(
         one: &TrialSpecific,
         finding: &Finding<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Self {
         /// Parameters of time and speed, not of size.
         const SHAPES: [&str; 4] = ["frequency", "phase", "start", "duration"];

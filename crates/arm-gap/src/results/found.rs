@@ -8,8 +8,8 @@ use super::absorbed::{absorbed, stopped};
 use super::channel_gap::channel_gaps;
 use super::limit::limits;
 use super::{
-    Absorbed, Asked, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, SearchStep,
-    SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
+    Absorbed, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, SearchInput,
+    SearchStep, SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
 };
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
@@ -84,7 +84,7 @@ impl GapResult {
     pub fn of<const N: usize>(
         prepared: &PreparedSession<'_, N>,
         finding: &Finding<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Result<Self, Refused> {
         let [calibrated, amended] = finding.in_trials.each_ref().map(Vec::as_slice);
         let plays = [
@@ -170,7 +170,7 @@ impl GapResult {
 }
 
 /// Every named effect, that which explains most first.
-fn effects<const N: usize>(finding: &Finding<N>, asked: &Asked<'_>) -> Vec<Missing> {
+fn effects<const N: usize>(finding: &Finding<N>, asked: &SearchInput<'_>) -> Vec<Missing> {
     let together = finding.named.iter();
     let together = together.map(|n| Missing::named(n, finding, asked));
     let apart = finding.trial_specific.iter();
@@ -276,7 +276,7 @@ impl Screening {
     pub fn of<const N: usize>(
         prepared: &PreparedSession<'_, N>,
         look: &Look<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Result<Self, Refused> {
         let plays = [(Version::Calibrated, look.in_trials.as_slice())];
         let trials = SimulatedTrial::played(prepared, asked, &plays);

@@ -8,9 +8,9 @@ use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::selection::model_selection::Named;
+use crate::selection::model_selection::NamedEffect;
 use crate::selection::passive_base::BaseLaw;
-use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep, Settled};
+use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
 use crate::selection::set_apart::SetApart;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
@@ -23,13 +23,13 @@ pub struct Finding<const N: usize> {
     /// The model with the named effects.
     pub amended: Fitted<N>,
     /// The named effects, those that explain most first.
-    pub named: Vec<Named>,
+    pub named: Vec<NamedEffect>,
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
     /// The calibrated and the amended model as they are in each trial; see [`crate::measurement_model::in_trial`].
     pub in_trials: [Vec<Hypothesis<N>>; 2],
     /// Rounds of the search.
-    pub search_trace: Vec<SearchStep>,
+    pub search_trace: Vec<SearchRound>,
     /// How well the amended model is known.
     pub precision: Precision,
     /// Lack of fit of the calibrated and of the amended model.
@@ -56,7 +56,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Selects the laws of the passive base, and measures what is left.
     pub(crate) fn concluded(
         &mut self,
-        (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
+        (mut state, mut named): (SearchState<'a, N>, Vec<NamedEffect>),
         mut apart: SetApart<N>,
         progress: Progress<'_>,
     ) -> Result<Finding<N>, GapError> {
@@ -116,10 +116,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// back the springs of both joints, and the effects that had replaced them become redundant.
     fn judged_with_base(
         &mut self,
-        (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
+        (mut state, mut named): (SearchState<'a, N>, Vec<NamedEffect>),
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<(SearchState<'a, N>, Vec<Named>, Vec<BaseLaw<N>>), GapError> {
+    ) -> Result<(SearchState<'a, N>, Vec<NamedEffect>, Vec<BaseLaw<N>>), GapError> {
         progress("judging the passive base", 0.88)?;
         let found = (state.current.asked.clone(), self.dropped.clone());
         let settled = self.afresh((state.current, state.point));
@@ -149,7 +149,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn known(
         &mut self,
         (amended, point): Settled<'a, N>,
-        named: &mut Vec<Named>,
+        named: &mut Vec<NamedEffect>,
         (base, scale): (&[BaseLaw<N>], f64),
     ) -> Result<Known<N>, GapError> {
         let alone = self.precision(&point, &amended, scale)?;
@@ -248,7 +248,7 @@ fn is_as_judged(found: &(Vec<Candidate>, Vec<bool>), now: &(Vec<Candidate>, Vec<
 fn widened<const N: usize>(
     alone: &Precision,
     amended: &Fitted<N>,
-    named: &[Named],
+    named: &[NamedEffect],
     (first, base): (usize, &[BaseLaw<N>]),
 ) -> Precision {
     let mut precision = alone.clone();
@@ -291,7 +291,7 @@ fn rhythms_of(trial_specific: &[TrialSpecific]) -> Vec<Effect<f64>> {
 ///
 /// * `explained` - what all of them explain, in units of twice the log-likelihood; infinite where nothing can be simulated without
 ///   them
-fn share_out(named: &mut [Named], explained: f64) {
+fn share_out(named: &mut [NamedEffect], explained: f64) {
     let all = match explained.is_finite() {
         true => explained,
         false => named.iter().map(|n| n.gain).sum(),

@@ -24,12 +24,12 @@ pub struct Look<const N: usize> {
     /// Its lack of fit.
     pub lack: LackOfFit,
     /// Every candidate alone, the one that is most worth its price first.
-    pub suspects: Vec<Suspect>,
+    pub suspects: Vec<ScreenedCandidate>,
 }
 
 /// One candidate alone, to first order.
 #[derive(Clone, Debug)]
-pub struct Suspect {
+pub struct ScreenedCandidate {
     /// The question.
     pub candidate: Candidate,
     /// The effect as it would be.
@@ -58,11 +58,11 @@ impl<const N: usize> PreparedSession<'_, N> {
         let library = Library::build(self, &point, None)?;
         let score_test = ScoreTest::new(self, &calibrated, &point, &library)?.scaled();
         let lack = lack_of_fit(self, &point, &calibrated);
-        let mut suspects: Vec<Suspect> = (0..score_test.len())
+        let mut suspects: Vec<ScreenedCandidate> = (0..score_test.len())
             .filter_map(|c| {
                 let choice = score_test.evaluate(&[c])?;
                 let candidate = library.candidates[c].clone();
-                Some(Suspect {
+                Some(ScreenedCandidate {
                     effect: candidate.found(&choice.coefficients[0]),
                     gain: choice.gain / score_test.scale,
                     price: score_test.price[c] * score_test.spread[c],
@@ -73,7 +73,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             .collect();
         suspects.sort_by(|a, b| (b.gain - b.price).total_cmp(&(a.gain - a.price)));
         // Of several shapes and questions of one effect the best stands for it, and shows as much as the clearest.
-        let mut best: Vec<Suspect> = Vec::new();
+        let mut best: Vec<ScreenedCandidate> = Vec::new();
         for suspect in suspects {
             match best
                 .iter_mut()

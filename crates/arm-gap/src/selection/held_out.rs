@@ -25,12 +25,12 @@ pub struct Gap {
     /// Standard deviation of the difference of both where nothing is missing.
     pub floor_std: Option<f64>,
     /// Where more is left.
-    pub open: Option<Open>,
+    pub open: Option<OpenSpan>,
 }
 
 /// Where a channel's gap is open.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Open {
+pub struct OpenSpan {
     /// The trial.
     pub trial: usize,
     /// Start and end there \[s\].
@@ -100,7 +100,7 @@ fn channel(trials: &[Left], c: usize) -> Gap {
     let missing = tests.iter().find(|&&t| trials[t].residuals.is_none());
     let open_everywhere = |&trial: &usize| {
         let end = trials[trial].counted.len() as f64 / trials[trial].rate;
-        Open {
+        OpenSpan {
             trial,
             span: (0.0, end),
             size: f64::INFINITY,
@@ -234,7 +234,7 @@ fn mean<'p>(pieces: impl Iterator<Item = &'p Piece>) -> Option<f64> {
 }
 
 /// The run of pieces that exceeds the floor by most, and by how much.
-fn worst(trial: usize, pieces: &[Piece], floor: f64) -> Option<(f64, Open)> {
+fn worst(trial: usize, pieces: &[Piece], floor: f64) -> Option<(f64, OpenSpan)> {
     let allowed = floor * (1.0 + TOLERATED) * (1.0 + TOLERATED);
     let mut best: Option<(f64, usize, usize)> = None;
     let (mut sum, mut start) = (0.0, 0);
@@ -252,7 +252,7 @@ fn worst(trial: usize, pieces: &[Piece], floor: f64) -> Option<(f64, Open)> {
         let size = libm::sqrt(mean(own.iter()).unwrap_or(0.0));
         (
             sum,
-            Open {
+            OpenSpan {
                 trial,
                 span: (own[0].span.0, own[own.len() - 1].span.1),
                 size,

@@ -69,7 +69,7 @@ pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explain
 
 /// One effect that was named.
 #[derive(Clone, Debug)]
-pub struct Named {
+pub struct NamedEffect {
     /// Its place in the hypothesis.
     pub slot: usize,
     /// Probability of such a gain by chance, with all candidates that were tested.
@@ -79,12 +79,12 @@ pub struct Named {
     /// Share of what can be explained that is lost without it.
     pub share: f64,
     /// What would explain the same: the candidate, and how much worse it does.
-    pub alternatives: Vec<Alternative>,
+    pub alternatives: Vec<FittedAlternative>,
 }
 
 /// Another effect that explains the same as a named one.
 #[derive(Clone, Debug)]
-pub struct Alternative {
+pub struct FittedAlternative {
     /// Its candidate.
     pub candidate: Candidate,
     /// The effect as it fits best.
@@ -97,7 +97,7 @@ pub struct Alternative {
 
 /// An alternative, fitted.
 pub(crate) struct Rival<const N: usize> {
-    pub alternative: Alternative,
+    pub alternative: FittedAlternative,
     pub fitted: Fitted<N>,
 }
 
@@ -247,7 +247,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         calibrated: &Fitted<N>,
         (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
         progress: Progress<'_>,
-    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>, Vec<Named>), GapError> {
+    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>, Vec<NamedEffect>), GapError> {
         let mut exchanges = 0;
         'again: loop {
             let mut named = Vec::new();
@@ -304,7 +304,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 let candidate = &fitted.asked[slot];
                 let chance = chi_square_tail(gain / scale, candidate.width());
-                named.push(Named {
+                named.push(NamedEffect {
                     slot,
                     p_value: (asked * chance).min(1.0),
                     gain: gain / scale,
@@ -322,7 +322,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         rivals: Vec<Rival<N>>,
         own: &Candidate,
         gain: f64,
-    ) -> Vec<Alternative> {
+    ) -> Vec<FittedAlternative> {
         let all = rivals.into_iter().map(|r| r.alternative);
         all.filter(|a| a.worse <= self.tie(own, gain)).collect()
     }
@@ -344,7 +344,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// what sensors and a rigid model get wrong.
     pub(crate) fn takes_over(
         &self,
-        rival: &Alternative,
+        rival: &FittedAlternative,
         (own, gain): (&Candidate, f64),
         bent: f64,
     ) -> bool {
@@ -436,7 +436,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
             let likeness = twin.map_or(0.0, |t| score_test.likeness(t.place, member));
             Some(Rival {
-                alternative: Alternative {
+                alternative: FittedAlternative {
                     candidate: asked,
                     effect,
                     worse,

@@ -16,7 +16,7 @@ use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::selection::model_selection::{Alternative, Named, TIE};
+use crate::selection::model_selection::{FittedAlternative, NamedEffect, TIE};
 use crate::selection::passive_base_evidence::{ODDS, STAYS, Term, crossed_joints, least_of};
 use crate::selection::search_state::Settled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -36,7 +36,7 @@ pub(crate) struct BaseLaw<const N: usize> {
     /// Square of its first parameter in standard deviations.
     pub gain: f64,
     /// What does as well in its joint.
-    pub alternatives: Vec<Alternative>,
+    pub alternatives: Vec<FittedAlternative>,
     /// The hypothesis in which something else takes its place, where that explains more.
     better: Option<Fitted<N>>,
     /// What came clearly nearer to the data with something else in its place, whatever that is.
@@ -435,7 +435,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         law: BaseLaw<N>,
         amended: &mut Fitted<N>,
         precision: &mut Precision,
-    ) -> Named {
+    ) -> NamedEffect {
         let (known, slot) = (self.session.effects.len() + law.base, amended.asked.len());
         for c in &mut precision.coordinates {
             if let Target::Known(e, p) = c.target
@@ -448,7 +448,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         amended.hypothesis.named.push(effect);
         let width = law.question.width();
         amended.asked.push(law.question);
-        Named {
+        NamedEffect {
             slot,
             p_value: chi_square_tail(law.gain, width),
             gain: law.gain,

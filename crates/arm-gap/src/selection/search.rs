@@ -9,9 +9,9 @@ use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::conclusion::Finding;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
-use crate::selection::model_selection::{Named, mimicked_by_any};
+use crate::selection::model_selection::{NamedEffect, mimicked_by_any};
 use crate::selection::score_test::{Choice, ScoreTest};
-use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep, Settled};
+use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
 use crate::selection::set_apart::SetApart;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
@@ -99,7 +99,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         mut state: SearchState<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<(SearchState<'a, N>, Vec<Named>), GapError> {
+    ) -> Result<(SearchState<'a, N>, Vec<NamedEffect>), GapError> {
         let kinds = |f: &Fitted<N>| f.asked.iter().map(Candidate::kind).collect::<Vec<_>>();
         let mut outcomes = Vec::new();
         for turn in 1.. {
@@ -319,7 +319,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         state: &SearchState<'a, N>,
         (library, score_test, room): (&Library, &ScoreTest, usize),
-    ) -> Option<(Settled<'a, N>, SearchStep)> {
+    ) -> Option<(Settled<'a, N>, SearchRound)> {
         let current = &state.current;
         // Less than every effect must explain need not be converged.
         let explained = state.calibrated.cost - current.cost;
@@ -374,7 +374,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         worthy.sort_by(|a, b| b.0.total_cmp(&a.0));
         // A solution that can be followed but not simulated is refused.
         converged.worthy.into_iter().find_map(|(_, better)| {
-            let step = SearchStep {
+            let step = SearchRound {
                 tried: converged.tried.clone(),
                 before: current.cost,
                 after: better.cost,

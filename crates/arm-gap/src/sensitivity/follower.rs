@@ -12,7 +12,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course};
 use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
-use crate::sensitivity::newton::{Missing, newton, slide};
+use crate::sensitivity::newton::{MissingTorque, newton, slide};
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;
 
@@ -186,7 +186,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             for j in (0..N).filter(|&j| !held[j]) {
                 there.friction[j] = 0.0;
             }
-            Missing {
+            MissingTorque {
                 torque: error - there.torque - friction,
                 speed: state.q + angle - near,
                 there,
@@ -233,7 +233,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         let (next, found, exact) = if self.dry {
             let missing = |next: &Joints<f64, N>| {
                 let there = there(next);
-                Missing {
+                MissingTorque {
                     torque: error - there.torque,
                     speed: instant.state.qd + instant.speed_with(next),
                     there,

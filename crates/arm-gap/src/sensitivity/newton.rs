@@ -96,7 +96,7 @@ pub(super) fn newton<const N: usize>(
 }
 
 /// What is missing at an unknown where joints have dry friction.
-pub(super) struct Missing<const N: usize> {
+pub(super) struct MissingTorque<const N: usize> {
     /// Torque missing, friction apart \[N m\].
     pub torque: Joints<f64, N>,
     /// Speeds at the end of the step \[rad/s\].
@@ -118,7 +118,7 @@ pub(super) fn slide<const N: usize>(
     start: Joints<f64, N>,
     (mut slope, reach): (SMatrix<f64, N, N>, f64),
     modes: &mut [Mode; N],
-    missing: impl Fn(&Joints<f64, N>) -> Missing<N>,
+    missing: impl Fn(&Joints<f64, N>) -> MissingTorque<N>,
 ) -> Option<Slid<N>> {
     /// Increment of speed for a difference quotient \[rad/s\].
     const NUDGE: f64 = 1e-5;
@@ -226,7 +226,7 @@ mod tests {
     fn a_joint_that_slides_sticks_where_friction_holds_what_pulls_it() {
         // Unit inertia, friction up to 1 N m, steps of 0.01 s, speed 0 before.
         let slid = |pull: f64| {
-            let missing = |next: &Joints<f64, 1>| Missing {
+            let missing = |next: &Joints<f64, 1>| MissingTorque {
                 torque: Joints::repeat(pull - next[0]),
                 speed: next * 0.01,
                 there: balance(1.0),

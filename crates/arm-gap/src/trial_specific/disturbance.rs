@@ -10,7 +10,9 @@ use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{TrialSpecific, timing_of};
-use crate::trial_specific::disturbance_shape::{Asked, Explained, Shape, scatter_elsewhere, timed};
+use crate::trial_specific::disturbance_shape::{
+    CandidateDisturbance, Explained, Shape, scatter_elsewhere, timed,
+};
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// The clearest disturbance of a single trial; `None` when no trial stands out.
@@ -98,14 +100,14 @@ impl<const N: usize> PreparedSession<'_, N> {
                 (*p, row)
             };
             let rows = shape.columns.iter().map(row).collect();
-            Asked::along(shape.effect, rows, &suspect.deviation)
+            CandidateDisturbance::along(shape.effect, rows, &suspect.deviation)
         };
-        let asked: Vec<Asked> = shapes.iter().filter_map(see).collect();
-        let mut clearest: Vec<(f64, &Asked)> = Vec::new();
+        let asked: Vec<CandidateDisturbance> = shapes.iter().filter_map(see).collect();
+        let mut clearest: Vec<(f64, &CandidateDisturbance)> = Vec::new();
         let possible = asked.iter().filter(|one| self.is_possible(one, suspect));
         for one in possible {
             let gain = one.gain(&suspect.deviation) / scale;
-            let same = |(_, c): &&mut (f64, &Asked)| c.place() == one.place();
+            let same = |(_, c): &&mut (f64, &CandidateDisturbance)| c.place() == one.place();
             match clearest.iter_mut().find(same) {
                 Some(known) if known.0 >= gain => (),
                 Some(known) => *known = (gain, one),
@@ -115,7 +117,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
         clearest.retain(|(gain, _)| *gain > NEAR * most);
         let answer = |effect| see(&self.shape_of(point, group, effect)?);
-        let at_its_time = |(_, one): &(f64, &Asked)| {
+        let at_its_time = |(_, one): &(f64, &CandidateDisturbance)| {
             let asked = timed((*one).clone(), &suspect.deviation, answer);
             Explained::of(asked, &suspect.deviation)
         };
@@ -139,7 +141,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// Whether a disturbance is possible in a trial: the trial deviates from all repeats by more than any of them does. Two trials deviate
     /// alike, and the disturbed one is further from the model. A disturbance with little effect on the compared samples, or in a joint that
     /// sticks, would have to be larger than its limit.
-    fn is_possible(&self, one: &Asked, suspect: &Compared) -> bool {
+    fn is_possible(&self, one: &CandidateDisturbance, suspect: &Compared) -> bool {
         let own = dot(&one.row, &suspect.own);
         let others: Vec<f64> = suspect.others.iter().map(|o| dot(&one.row, o)).collect();
         let centre = match others.len() {
@@ -160,7 +162,12 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// may hold it.
     ///
     /// * `effects` - of the model that is compared
-    fn is_finding(&self, one: &Asked, suspect: &Compared, effects: &[Effect<f64>]) -> bool {
+    fn is_finding(
+        &self,
+        one: &CandidateDisturbance,
+        suspect: &Compared,
+        effects: &[Effect<f64>],
+    ) -> bool {
         let prior = one.effect.kind.prior();
         let promised = match (prior.nature, prior.promise) {
             (Nature::Slip, _) => self.session.tolerance.handle_placement,

@@ -1,4 +1,4 @@
-//! What the tests of the joint method share: how they ask, and how they read the answer.
+//! Shared by the tests of the joint method: input, and access to results.
 
 use arm_core::{Chain, Segment, models};
 use arm_ident::inference::estimate::{Estimate, Identified};

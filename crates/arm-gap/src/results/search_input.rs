@@ -11,7 +11,7 @@ pub struct TrialFile {
 
 /// The input of a search, in the terms of the files.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct SearchInput<'a> {
     /// The model as given.
     pub model: &'a Model,
     /// Whether the forces in the files are on the robot.
