@@ -6,7 +6,7 @@
 use arm_core::{Joints, Plane};
 use nalgebra::SMatrix;
 
-/// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
+/// Point of a step at which its rates count: a little beyond the middle, so that fast vibrations are damped.
 const THETA: f64 = 0.55;
 /// Change of an angle for difference quotients \[rad\].
 const ANGLE: f64 = 1e-6;

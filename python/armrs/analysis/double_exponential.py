@@ -65,7 +65,7 @@ class Shape:
     values : ndarray, shape (7,)
         In the order of `NAMES`; the steepness and ratio of an exponential that is not there are zero.
     covariances : ndarray, shape (2, 7, 7)
-        By leaving out one trial at a time, and by the noise with what is known beforehand; of a steepness, of its logarithm.
+        By leaving out one trial at a time, and by the noise with the priors; of a steepness, of its logarithm.
     squares : float
         Sum of squares that is left within trials [N² m²].
     """
@@ -172,7 +172,7 @@ class Problem:
         return max(squares / max(len(self.q) - self.count - 7, 1), 1e-300)
 
     def _refined(self, start: np.ndarray, variance: float, ratios: bool) -> tuple[np.ndarray, float]:
-        """Return the best values near a start and the variance that they leave; what is known beforehand counts against the start's."""
+        """Return the best values near a start and the variance that they leave; their priors are included."""
         from scipy.optimize import least_squares
 
         sd, wide = float(np.sqrt(variance)), FARTHEST if ratios else 1e-12
@@ -203,7 +203,7 @@ class Problem:
         return Shape(values, covariances, float(residual @ residual))
 
     def _covariances(self, jacobian: np.ndarray, residual: np.ndarray, variance: float, free: np.ndarray) -> np.ndarray:
-        """Return the covariances by leaving out one trial at a time, linearised, and by the noise and what is known beforehand."""
+        """Return the covariances by leaving out one trial at a time, linearised, and by the noise and the priors."""
         known = variance * np.array([0.0, 0.0, 0.0, *[STEEPNESS_STD**-2] * 2, *[RATIO_STD**-2] * 2])[free]
         scale = np.linalg.norm(jacobian, axis=0) + 1e-300
         scaled = jacobian / scale

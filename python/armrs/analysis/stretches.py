@@ -30,9 +30,9 @@ NEEDED = 12.0
 RESTING = 0.05
 """Speed below which a joint rests [rad/s]: dry friction then holds it with any torque up to its own."""
 HELD = 0.1
-"""Time for which what holds a joint at rest is taken as constant, and for which a swing is no movement [s]."""
+"""Time for which what holds a joint at rest is taken as constant, and for which an oscillation is no movement [s]."""
 ELASTIC = 5
-"""Degree of the polynomial that stands for the springs of a joint."""
+"""Degree of the polynomial that describes the springs of a joint."""
 _SLIGHT = 1e-3
 """Size beside the largest below which an unknown of a trial is rounding."""
 SHAPES = ("threshold", "latency", "tonic", "slope")
@@ -54,7 +54,7 @@ class Stretch:
     smooth : callable
         The low-pass that angle and moment went through: what reflex and friction should show went through it too.
     coarser : callable
-        A low-pass of half the cutoff for the fine motion: what it changes stands for what the one in use may have done.
+        A low-pass of half the cutoff for the fine motion: its change is an estimate of that of the one in use.
     shared : ndarray, shape (n_errors, n)
         What errors that all sessions share, each of one standard deviation, do to the moment [N m]: of masses and of the force sensor.
     placed : ndarray, shape (n_errors, n)

@@ -48,7 +48,7 @@ class Estimate:
 
     @property
     def most(self) -> float:
-        """Largest error that this estimate stands for: that of a coupling of first order, of which it is two thirds."""
+        """Largest error at this estimate: that of a coupling of first order, of which it is two thirds."""
         return self.error if self.at is not None else 1.5 * self.error
 
     @property

@@ -77,7 +77,7 @@ class _Plan:
 class ImportedSlave(Partner):
     """An FMU for co-simulation, FMI 2.0 or 3.0, from any tool, loaded into this process.
 
-    It runs the native code of the FMU with the rights of this process, and dies with it; `IsolatedSlave` has it in a process of its
+    It runs the native code of the FMU with the rights of this process, and a crash ends both; `IsolatedSlave` has it in a process of its
     own. It is unpacked into a temporary folder that `free` removes.
 
     Parameters

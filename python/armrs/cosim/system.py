@@ -401,7 +401,7 @@ def parted(text: str, slaves: Iterable[str]) -> tuple[str, str]:
 
 
 def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str, str]]:
-    """Return the variables that a name stands for: itself, or all of its indices."""
+    """Return the variables of a name: itself, or all of its indices."""
     text = checks.text(key, value)
     name, variable = parted(text, slaves)
     if name not in slaves:

@@ -1,4 +1,4 @@
-"""Checking an FMU: what the file promises against the standard, and what the library does against what the file promises."""
+"""Checking an FMU: the description against the standard, and the library against the description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The library of an FMU, tried: what it does against what its description promises. It runs in a process of its own."""
+"""The library of an FMU, tried: its behaviour against its description. It runs in a process of its own."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def parts(description: Description) -> list[int | None]:
 
 
 def _guarded(trial: Trial, promise: Callable[[Trial], None]) -> None:
-    """Keep one broken promise from hiding the others."""
+    """Keep one failure from hiding the others."""
     try:
         promise(trial)
     except ArmrsError as refused:

@@ -550,7 +550,7 @@ def _is_dry(kind: str) -> bool:
 
 
 def _intervals(doubted: Sequence[str]) -> str:
-    """Return what intervals claim."""
+    """Return the meaning of the intervals."""
     beside = f"; here they may be too narrow: {'; '.join(dict.fromkeys(doubted))}" if doubted else ""
     return f"95 % intervals. They hold if the joint behaves as a spring with resistance and friction{beside}."
 

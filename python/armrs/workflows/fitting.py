@@ -158,7 +158,7 @@ def _bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:
 
 
 def _place(effects: list[Effect], name: str) -> tuple[int, int, float, float]:
-    """Return index of effect and parameter that a name stands for, and the bounds of the catalogue."""
+    """Return index of effect and parameter of a name, and the bounds of the catalogue."""
     known = {}
     for index, effect in enumerate(effects):
         for number, parameter in enumerate(catalogue()[effect.kind].parameters):

@@ -474,7 +474,7 @@ class CoreSettings:
 
 
 _FAR = 2.0
-"""A calibration this many times its tolerance, which is its standard deviation beforehand, may stand for something else."""
+"""A calibration this many times its tolerance, which is its prior standard deviation, may represent another error."""
 _BEYOND = 5.0
 """A calibration this many times its tolerance is no calibration."""
 _WIDE = 0.25
@@ -519,7 +519,7 @@ def _beyond_segment(model: Model, parameters: Sequence[Estimate]) -> tuple[str, 
 
 
 def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: Tolerance, above: float, to: float) -> tuple[str, ...]:
-    """Return the calibrations that came out larger than promised, more than `above` and up to `to` times, a line each."""
+    """Return the calibrations larger than their tolerance, more than `above` and up to `to` times, a line each."""
     lines = []
     for e in calibration:
         promised = _promised(e, tolerance)

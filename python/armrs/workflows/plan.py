@@ -41,7 +41,7 @@ class Instruments:
     angle : float
         Standard deviation of a single angle sample [rad].
     tolerance : Tolerance
-        What the calibration promises.
+        Tolerances of the calibration.
     """
 
     rate: float = 50.0

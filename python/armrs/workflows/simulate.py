@@ -242,7 +242,7 @@ class Simulated(Doubted, Tabular, Series):
 
 
 def digested(columns: Mapping[str, Any]) -> list[str]:
-    """Return the names of the columns that a digest stands for, in its order."""
+    """Return the names of the columns of a digest, in its order."""
     return [name for name in columns if name not in ("effects", "energy_error")]
 
 

@@ -10,9 +10,9 @@ pub struct Prior {
     pub parts: &'static [Part],
     /// How it comes and goes.
     pub nature: Nature,
-    /// What of it the calibration of a rig promises to be small.
+    /// What of it is within the tolerance of a rig's calibration.
     pub promise: Option<Promise>,
-    /// Share of what it shows (as a sum of squares) that its law may miss: much for laws that stand for a family of shapes.
+    /// Possible error of its law, as a share of its sum of squares: large for laws that represent a family of shapes.
     pub missed: f64,
     /// Its family, where its place does not decide it.
     pub family: Option<Family>,
@@ -95,7 +95,7 @@ impl Nature {
     }
 }
 
-/// A promise of the calibration, see the table `[tolerance]` of a data set.
+/// A tolerance of the calibration, see the table `[tolerance]` of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
     /// Offsets of joint angles.
@@ -207,7 +207,7 @@ impl Prior {
         Self { missed, ..self }
     }
 
-    /// What the calibration promises to be small.
+    /// What is within the tolerance of the calibration.
     pub const fn promised(self, promise: Promise) -> Self {
         Self {
             promise: Some(promise),

@@ -9,7 +9,7 @@ use crate::scalar::Real;
 pub enum Decision {
     /// The data.
     Data,
-    /// What was assumed beforehand: the data leave it open.
+    /// The prior: the data do not determine it.
     Prior,
     /// A bound that the data push against.
     Bound,

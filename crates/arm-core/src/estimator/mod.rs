@@ -153,11 +153,11 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     pub fn equation(&self) -> &Equation<T, N, P, E> {
         &self.equation
     }
-    /// What was known of them beforehand.
+    /// Their priors.
     pub fn priors(&self) -> &[Prior<T>; P] {
         &self.priors
     }
-    /// What is known of them now.
+    /// Their estimates.
     pub fn estimates(&self) -> &[Estimate<T>; P] {
         &self.estimates
     }

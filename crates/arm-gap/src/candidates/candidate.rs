@@ -11,7 +11,7 @@ use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
-/// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
+/// Gain needed by one effect beyond its degrees of freedom, in units of twice the log-likelihood: about one false name in a thousand
 /// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.
 pub const THRESHOLD: f64 = 12.0;
 /// One question: a kind at a place in a shape, with what is free in it.

@@ -255,7 +255,7 @@ impl<const N: usize> Session<N> {
         held
     }
 
-    /// A law with what is known of its numbers beforehand.
+    /// A law with priors of its parameters.
     fn passive(&self, effect: Effect<f64>) -> Passive {
         /// Change of a law's size that a response is taken with, as a share of its typical size.
         const STEP: f64 = 0.01;

@@ -16,7 +16,7 @@ pub struct Passive {
     pub likely: bool,
 }
 
-/// A number of a law, with what is known of it beforehand.
+/// A parameter of a law, with its prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Free {
     /// Its position among the parameters.

@@ -1,4 +1,4 @@
-//! What is challenged and by what: the model as given, the trials, and what the calibration promises.
+//! The input of a search: the model as given, the trials, and the tolerances of the calibration.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place, Promise};
 use arm_core::{Chain, Contact, Setup};
@@ -20,7 +20,7 @@ pub struct Session<const N: usize> {
     pub effects: Vec<Effect<f64>>,
     /// Relative standard deviation of masses, centres of mass and inertias; 0 holds them.
     pub segment_uncertainty: f64,
-    /// What the calibration promises.
+    /// Tolerances of the calibration.
     pub tolerance: Tolerance,
     /// The trials.
     pub trials: Vec<Trial<N>>,

@@ -86,7 +86,7 @@ fn axes_of(points: &[Plane<f64>]) -> Vec<Vec<f64>> {
 
 /// Power of each channel above a cutoff, for each hertz up to half of the sampling rate.
 ///
-/// * `typical` - what stands for all squares
+/// * `typical` - the typical value of squares
 fn densities(
     channels: &[Vec<f64>],
     cutoff: f64,

@@ -72,7 +72,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             })
             .collect();
         suspects.sort_by(|a, b| (b.gain - b.price).total_cmp(&(a.gain - a.price)));
-        // Of several shapes and questions of one effect the best stands for it, and shows as much as the clearest.
+        // Of several shapes and candidates of one effect the best represents it, with the smallest visible size.
         let mut best: Vec<ScreenedCandidate> = Vec::new();
         for suspect in suspects {
             match best

@@ -451,7 +451,7 @@ fn precision_of<const N: usize>(
     Precision { coordinates, sd }
 }
 
-/// The places of the coordinates that the data and what is known beforehand decide, and the factor of their equations.
+/// The places of the coordinates that data and priors determine, and the factor of their equations.
 pub(crate) fn decided<const N: usize>(
     fitted: &Fitted<N>,
     coordinates: &[Coordinate],

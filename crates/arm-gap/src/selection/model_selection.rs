@@ -34,7 +34,7 @@ const EXCHANGES: usize = 4;
 /// and where it explains more by a tie or more: each time less is left, so that this ends by itself.
 const CLEAR_EXCHANGES: usize = 16;
 
-/// Part of what a law misses that an effect in another place can stand for: the error acts in the joint of the law, and seldom
+/// Part of the error of a law that an effect in another place can explain: the error acts in the joint of the law, and seldom
 /// resembles another effect.
 const ELSEWHERE: f64 = 0.25;
 /// The same of what swings there: it has one frequency and is alike in every movement, and what a law misses is neither.
@@ -279,7 +279,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     }
                     _ => Vec::new(),
                 };
-                // A shape that is refined may stand for what the law of another one misses.
+                // A shape that is refined may explain the error of the law of another one.
                 let bent = self.mimicked_beside((&fitted, slot, less), &[], &point);
                 let better = rivals.iter().find(|r| {
                     let clear = r.alternative.worse < -TIE;
@@ -339,7 +339,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// Whether another effect takes the place of a named one.
     ///
-    /// The better one does, when it earns the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
+    /// The better one does, when its gain exceeds the price of the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
     /// one with fewer parameters or, with as many, the one that stands before it in the catalogue: an intricate one bends itself to
     /// what sensors and a rigid model get wrong.
     pub(crate) fn takes_over(
@@ -486,7 +486,7 @@ mod tests {
 
     use super::*;
 
-    /// Dry friction stands for a family of laws and may miss 3 %: what is near its joint may be that, elsewhere a quarter of it.
+    /// Dry friction represents a family of laws with an error up to 3 %: what is near its joint may be that, elsewhere a quarter of it.
     #[test]
     fn an_effect_must_explain_more_than_the_law_of_another_misses() {
         let friction = Effect::<f64>::new(Kind::Coulomb, 1);

@@ -235,7 +235,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             } else {
                 shapes
             };
-            // A shape may stand for what the law of another one misses.
+            // A shape may explain the error of the law of another one.
             let bent = self.mimicked_beside((current, slot, current), &base, point);
             if let Ok((fitted, point)) = self.settle(start, asked)
                 && fitted.cost < current.cost + f64::max(price, bent)
@@ -477,7 +477,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The model as given, refitted without its base, and what it leaves; `None` where there is no base.
     ///
-    /// Where it cannot be simulated the model as given stands for it, and what it leaves is what the laws of the base gain.
+    /// Where it cannot be simulated the model as given replaces it, and its residual is the gain of the laws of the base.
     ///
     /// * `gained` - what each of them gains, in units of twice the log-likelihood
     pub(crate) fn rigid(&self, gained: &[f64]) -> Option<(Fitted<N>, LackOfFit)> {

@@ -25,7 +25,7 @@ pub struct ScoreTest {
     pub spread: Vec<f64>,
     /// By how much movements differ in what each candidate gains, beyond chance; see [`unlike`].
     pub unlike: Vec<f64>,
-    /// What each candidate must earn to be named.
+    /// Gain of each candidate needed to be named.
     pub price: Vec<f64>,
     /// Misfit for each degree of freedom that no choice of candidates would take away; at least one, and one until it is measured
     /// by [`ScoreTest::scaled`].
@@ -158,7 +158,7 @@ impl ScoreTest {
         self.answer(members, &self.score)
     }
 
-    /// How well a candidate stands for a named effect: its part of what that one shows, and its coefficients.
+    /// How well a candidate replaces a named effect: the share of its response, and the coefficients.
     pub fn stand_in(&self, candidate: usize, twin: &Twin) -> Option<(f64, Choice)> {
         let shown = self.columns[twin.place].clone().zip(&twin.sizes);
         let mut score = vec![0.0; self.score.len()];

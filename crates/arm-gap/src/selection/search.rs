@@ -515,9 +515,9 @@ fn contenders(choices: &[Choice], library: &Library) -> (Vec<Choice>, Vec<Choice
     (best, reserves)
 }
 
-/// Whether a sensor is far from what was promised.
+/// Whether a sensor is far outside its tolerance.
 ///
-/// * `sensors` - how far each is off, in standard deviations of the promise
+/// * `sensors` - how far each is off, in standard deviations of the tolerance
 fn is_beyond_promise(mut sensors: impl Iterator<Item = f64>) -> bool {
     /// Standard deviations beyond which a sensor is far: one in twenty by chance.
     const FAR: f64 = 2.0;

@@ -20,7 +20,7 @@ pub struct Cluster {
     pub rows: usize,
 }
 
-/// The sum over trials, with what is known beforehand.
+/// The sum over trials, with the priors.
 #[derive(Clone, Debug)]
 pub struct Normal {
     /// `Σ AᵀA + Λ`.

@@ -130,7 +130,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             let left: Vec<_> = deviations.iter().map(|d| first.asked.left_of(d)).collect();
             Some(scatter_elsewhere(on_grid, &asked, &left))
         });
-        // What is none competes all the same: where it explains most, the others only stand for it.
+        // Impossible ones compete all the same: where one explains most, the others only imitate it.
         let effects = point.hypothesis.effects();
         let is_finding = |one: &Explained| self.is_finding(&one.asked, suspect, &effects);
         let is_told = explained.first().is_some_and(is_finding);

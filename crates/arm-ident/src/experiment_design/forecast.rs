@@ -66,7 +66,7 @@ pub struct Task<const N: usize> {
 /// Input of a forecast.
 #[derive(Clone, Debug)]
 pub struct Question<const N: usize> {
-    /// The assumed arm, with the effects that are to be fitted at guessed values.
+    /// The assumed arm, with the effects that are to be fitted at assumed values.
     pub model: Model<N>,
     /// The robot that has to reach the path.
     pub robot: Option<Robot<f64>>,
@@ -87,9 +87,9 @@ pub struct Predicted {
     pub effect: Option<usize>,
     /// Assumed value.
     pub value: f64,
-    /// Standard deviation to be expected, with what is known beforehand.
+    /// Standard deviation to be expected, with the priors.
     pub std: f64,
-    /// The same from the data alone, the calibration as promised.
+    /// The same from the data alone, the calibration within its tolerance.
     pub std_of_data: f64,
 }
 
@@ -367,7 +367,7 @@ fn condensed<const N: usize>(
     p: usize,
 ) -> Result<(Factor, Factor), IdentError> {
     let accuracy = question.accuracy;
-    // White noise through the low-pass and the decimation: each sample kept stands for so many.
+    // White noise through the low-pass and the decimation: each kept sample replaces so many.
     let step = ((accuracy.rate / (2.5 * accuracy.cutoff)) as usize).max(1) as f64;
     let mut mean = [[0.0; N]; N];
     let count: f64 = noise.iter().map(|n| n.len() as f64).sum();

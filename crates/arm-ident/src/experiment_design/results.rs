@@ -18,9 +18,9 @@ pub struct Prediction {
     pub joint: Option<usize>,
     /// Value assumed before the experiment, in `unit`.
     pub value: f64,
-    /// Standard deviation to be expected, with what is known beforehand, in `unit`.
+    /// Standard deviation to be expected, with the priors, in `unit`.
     pub std: f64,
-    /// The same from the data alone, within the calibration as promised, in `unit`.
+    /// The same from the data alone, the calibration within its tolerance, in `unit`.
     pub std_of_data: f64,
     /// The latter relative to the value; a parameter of an effect that is small counts as 0.05.
     pub relative: f64,

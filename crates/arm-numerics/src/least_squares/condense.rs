@@ -149,7 +149,7 @@ impl Condenser {
         Ok(true)
     }
 
-    /// Adds the problem that a factor stands for, its residual included.
+    /// Adds the problem of a factor, its residual included.
     ///
     /// # Errors
     /// [`NumericsError::Length`] if `factor` has another number of parameters; [`NumericsError::NotFinite`].

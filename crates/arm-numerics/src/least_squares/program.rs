@@ -75,7 +75,7 @@ impl Program {
         })
     }
 
-    /// The problem that a factor stands for.
+    /// The problem of a factor.
     ///
     /// # Errors
     /// As [`Program::new`].

@@ -85,7 +85,7 @@ impl AutoRegression {
     }
 }
 
-/// Burg's models of order 0, 1, … `order` of series that stand for a number of samples.
+/// Burg's models of order 0, 1, … `order` of series; power is divided by a number of samples.
 fn burg_path(mut forward: Vec<Vec<f64>>, order: usize, samples: usize) -> Vec<AutoRegression> {
     let mut backward = forward.clone();
     let mut variance = forward.iter().fold(0.0, |sum, x| sum + dot(x, x)) / samples as f64;

@@ -133,7 +133,7 @@ pub(super) struct Arm<'a, const N: usize> {
     /// Without joint forces.
     motion: Motion<f64, N>,
     pose: Pose<f64, N>,
-    /// Of a contact that gives way, and the power lost in it.
+    /// Of a compliant contact, and the power lost in it.
     contact: (Plane<f64>, f64),
     driving: Joints<f64, N>,
     form: Form<N>,
@@ -323,7 +323,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         }
     }
 
-    /// How fast each joint gives way to a newton metre in it, whatever its speed \[rad/(s² N m)\].
+    /// Acceleration of each joint per newton metre in it, at any speed \[rad/(s² N m)\].
     pub(super) fn yielding(&self) -> [f64; N] {
         core::array::from_fn(|j| self.column(j).0.qdd[j])
     }

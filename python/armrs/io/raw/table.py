@@ -55,7 +55,7 @@ class RawColumn:
 
 @dataclass(frozen=True)
 class Remark:
-    """Words that somebody wrote beside a sample: the name of their column, the row from 0, the text."""
+    """Words that were recorded with a sample: the name of their column, the row from 0, the text."""
 
     column: str
     row: int

@@ -57,7 +57,7 @@ def core_trials(dataset: Dataset) -> list[Trial]:
 
 
 def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> SearchSettings:
-    """Return what is known beforehand; as many threads as processors when none are given."""
+    """Return the prior knowledge; as many threads as processors when none are given."""
     unknown = unresolved_movements(dataset) if led else {}
     weights = {name: differ / math.hypot(missed, differ) for name, (missed, differ) in unknown.items()}
     return SearchSettings(

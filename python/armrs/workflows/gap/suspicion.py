@@ -87,7 +87,7 @@ def _wrong_setup(dataset: Dataset, led: bool) -> list[str]:
 def _apart(dataset: Dataset, led: bool) -> list[str]:
     """Return that hand and handle are apart on average: a base or a length is wrong by centimetres, which would be named as an effect.
 
-    A soft contact gives way by millimetres.
+    A soft contact deflects by millimetres.
     """
     gap = mean_gap(dataset)
     if gap is None or float(np.hypot(*gap)) < _APART:

@@ -337,7 +337,7 @@ def nearest(data: Mapping[str, Any], most: int = 8) -> Table:
 
 
 def calibration(data: Mapping[str, Any]) -> Table:
-    """Return what the calibration absorbed, beside what was promised."""
+    """Return what the calibration absorbed, beside its tolerance."""
     rows = []
     for a in data["calibration"]:
         factor, held_in = tables.read_in(a["unit"])
