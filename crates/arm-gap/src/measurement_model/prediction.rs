@@ -43,7 +43,7 @@ pub struct Course<const N: usize> {
     pub rate: f64,
     /// Cutoff of the low-pass \[Hz\].
     pub band: f64,
-    /// Samples over which a gap is measured: those that were measured. Where torques are compared, those [`MARGIN`] away from ends
+    /// Samples over which a gap is measured: those that were measured. Where torques are compared, those `MARGIN` away from ends
     /// and gaps, next to which filters and differences extrapolate.
     pub counted: Vec<bool>,
     /// What its samples weigh. Where that is less than one, forces are compared in the common band only: above it they hang on what the

@@ -82,7 +82,7 @@ impl<const N: usize> Session<N> {
     /// joint \[N m\].
     ///
     /// A joint at rest is held by any torque up to its friction in motion, and the force on a resting arm shows which. Joints that the
-    /// handle leaves free stay at their measured angles instead: see [`held_at_start`].
+    /// handle leaves free stay at their measured angles instead: see `held_at_start`.
     ///
     /// # Errors
     /// [`SimulationError`] for a rig that cannot be.
