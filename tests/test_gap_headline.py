@@ -12,6 +12,7 @@ from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
 from armrs.cli.analysis import after_gap
 from armrs.workflows.gap.headline import amount, headline, still_open
+from armrs.workflows.gap.results import formula_of
 from armrs.workflows.gap.summary import marks, rivals
 from armrs.workflows.gap.words import calibration, gap, heading, intervals, left, missing, named, nearest, others, tie
 
@@ -343,3 +344,9 @@ def test_the_headline_names_effects_in_the_order_of_the_table() -> None:
 
 def test_a_gap_beyond_a_hundred_has_no_exponent() -> None:
     assert amount("Fz_N", 123.0) == "120 N"
+
+
+@pytest.mark.parametrize(("smoothing", "formula"), [(0.0, "R = torque · sgn(q̇)"), (0.01, "R = torque · tanh(q̇/smoothing)")])
+def test_friction_that_sticks_has_the_sign_of_the_speed_in_its_formula(smoothing: float, formula: str) -> None:
+    effect = {"kind": "coulomb", "parameters": {"torque": {"value": 0.2}, "smoothing": {"value": smoothing}}}
+    assert formula_of(effect) == formula

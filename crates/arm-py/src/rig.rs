@@ -45,6 +45,15 @@ impl Rig {
         Self::of(&model, effects)
     }
 
+    /// Longest step with which the fourth-order method follows each effect's smooth dry friction at rest [s], the arm stretched.
+    ///
+    /// Infinite for effects without it.
+    fn longest_steps(&self) -> Vec<f64> {
+        each_length!(&self.arm.chain, c => {
+            self.effects.iter().map(|effect| arm_sim::longest_step(c, effect)).collect()
+        })
+    }
+
     /// Torque with which each effect resists in its joint along a motion, shape (n, n_effects) [N m].
     ///
     /// Parameters

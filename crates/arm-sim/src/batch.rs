@@ -14,7 +14,9 @@ use crate::prepare::{Prepared, commands};
 use crate::recorder::{Instant, Recorder, Row};
 use crate::state::{BaseMotion, Input, Outcome, State};
 use crate::step::{Inputs, Memory, step};
-use crate::{Assistance, Experiment, Handle, Integrator, Recording, SimulationError, simulate};
+use crate::{
+    Assistance, Experiment, Handle, Integrator, Recording, SimulationError, Springs, simulate,
+};
 use arm_core::simd_dispatch::{Computation, dispatch};
 
 /// Runs in one group.
@@ -509,8 +511,8 @@ fn pack_assistance<'a, const N: usize>(
     assistance: impl Fn(usize) -> Option<&'a Assistance<N>>,
 ) -> Option<[[Wide; N]; 2]> {
     assistance(0)?;
-    let of = |read: fn(&Assistance<N>) -> &[f64; N]| {
-        core::array::from_fn(|j| pack(|i| assistance(i).map_or(0.0, |a| read(a)[j])))
+    let of = |read: fn(&Springs<N>) -> &[f64; N]| {
+        core::array::from_fn(|j| pack(|i| assistance(i).map_or(0.0, |a| read(&a.springs)[j])))
     };
     Some([of(|a| &a.stiffness), of(|a| &a.damping)])
 }

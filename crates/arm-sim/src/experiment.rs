@@ -1,7 +1,7 @@
 //! What is simulated: the rig, what acts in it, how it is driven, and the numerical settings.
 
 use arm_core::effect::Effect;
-use arm_core::{Joints, Robot, Setup};
+use arm_core::{Chain, Joints, Pose, Robot, Setup, inertia};
 
 use crate::{HandlePath, Series, SimulationError};
 
@@ -41,22 +41,42 @@ pub struct Experiment<const N: usize> {
     pub columns: Columns,
 }
 
-/// A spring and a damper in every joint that pull towards an angle that moves, `K (q_d − q) + D (q̇_d − q̇)`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Assistance<const N: usize> {
-    /// The angles q_d \[rad\].
-    pub towards: Series<N>,
+/// A spring and a damper in every joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Springs<const N: usize> {
     /// K \[N m/rad\].
     pub stiffness: [f64; N],
     /// D \[N m s/rad\].
     pub damping: [f64; N],
 }
 
+impl<const N: usize> Springs<N> {
+    /// Those with which every joint of the stretched arm by itself follows with a natural frequency \[Hz\], critically damped.
+    pub fn of_frequency(chain: &Chain<f64, N>, frequency: f64) -> Self {
+        let stretched = inertia(chain, &Pose::new(&Joints::zeros()));
+        let pace = core::f64::consts::TAU * frequency;
+        Self {
+            stiffness: core::array::from_fn(|j| stretched[(j, j)] * pace * pace),
+            damping: core::array::from_fn(|j| 2.0 * stretched[(j, j)] * pace),
+        }
+    }
+}
+
+/// Springs and dampers that pull the joints towards angles that move, `K (q_d − q) + D (q̇_d − q̇)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assistance<const N: usize> {
+    /// The angles q_d \[rad\].
+    pub towards: Series<N>,
+    /// K and D.
+    pub springs: Springs<N>,
+}
+
 impl<const N: usize> Assistance<N> {
     /// `K q_d + D q̇_d` at a time \[N m\]; the rest is in the model.
     pub(crate) fn torque(&self, time: f64) -> Joints<f64, N> {
         let to = self.towards.at(time);
-        Joints::from_fn(|j, _| self.stiffness[j] * to.value[j] + self.damping[j] * to.rate[j])
+        let Springs { stiffness, damping } = &self.springs;
+        Joints::from_fn(|j, _| stiffness[j] * to.value[j] + damping[j] * to.rate[j])
     }
 }
 

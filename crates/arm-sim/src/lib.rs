@@ -45,7 +45,7 @@ pub use controlled::{Controlled, Controller, Fault, control};
 pub use digest::{Digest, definite, digest, digest_of};
 pub use error::{NoRest, SimulationError};
 pub use experiment::{
-    Assistance, Columns, Coupling, Drive, Experiment, Integrator, Start, altered,
+    Assistance, Columns, Coupling, Drive, Experiment, Integrator, Springs, Start, altered,
 };
 pub use interaction::{Interaction, Law, Support, Yielded, interact};
 pub use linearized::{Change, Slopes};
@@ -59,6 +59,6 @@ pub use room::{require_room, reserve_room};
 pub use sensor::{Channel, Readings, Sensors};
 pub use series::{Interpolation, Jet, Series, cubic_weights};
 pub use simulate::{Engine, simulate, simulate_in_pieces, simulate_partial, simulate_with};
-pub use stability::Vibration;
+pub use stability::{Vibration, longest_step};
 pub use stepper::{Outside, Port, Seen, Snapshot, Stepper};
 pub use supervisor::Safety;

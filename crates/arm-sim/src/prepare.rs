@@ -246,7 +246,7 @@ pub(crate) fn model_of<const N: usize>(
     let mut model = assemble(setup, &experiment.effects, link(experiment, setup)?)?;
     model.heaves |= experiment.base.is_some();
     if let Some(assistance) = &experiment.assistance {
-        model.assist(assistance.stiffness, assistance.damping);
+        model.assist(assistance.springs.stiffness, assistance.springs.damping);
     }
     Ok(model)
 }

@@ -1,6 +1,7 @@
-//! How long a step may be before the vibration of the contact grows.
+//! How long a step may be: before the vibration of the contact grows, and to follow steep dry friction.
 
-use arm_core::{Contact, Joints, Pose};
+use arm_core::effect::Effect;
+use arm_core::{Chain, Contact, Joints, Pose, inertia};
 
 use crate::model::{Link, Model};
 use crate::{Integrator, SimulationError};
@@ -56,6 +57,28 @@ impl Vibration {
 
 /// Radius of the largest half disc in the left half plane in which the fourth-order method is stable: 2.6155, rounded down.
 const RK4_RADIUS: f64 = 2.61;
+
+/// Largest rate of decay that the fourth-order method follows, times the step: where its stability ends on the negative real axis.
+const RK4_DECAY: f64 = 2.785;
+
+/// Longest step with which the fourth-order method follows smooth dry friction at rest, the arm stretched \[s\].
+///
+/// There the slope `size/smoothing` of the friction makes the speed of its joint decay at the rate `(B⁻¹)_jj size/smoothing`. Infinite where
+/// friction is not smooth, and where its size is a share of the force through the joint.
+pub fn longest_step<const N: usize>(chain: &Chain<f64, N>, effect: &Effect<f64>) -> f64 {
+    let Some(smoothing) = effect.kind.smoothed_by() else {
+        return f64::INFINITY;
+    };
+    let p = &effect.parameters;
+    if p[smoothing] <= 0.0 || effect.kind.info().parameters[0].unit != "N m" {
+        return f64::INFINITY;
+    }
+    let agility = inertia(chain, &Pose::new(&Joints::zeros())).try_inverse();
+    agility.map_or(f64::INFINITY, |m| {
+        let rate = m[(effect.index, effect.index)] * p[0] / p[smoothing];
+        RK4_DECAY / rate
+    })
+}
 
 /// Refuses a contact that is too stiff for the step, judged at one pose.
 ///

@@ -14,8 +14,6 @@ DEFAULT_DT = 0.25e-3
 """Step of a simulation [s]."""
 FINER = (1, 4, 16, 64)
 """Steps within `DEFAULT_DT` that are tried in turn, until one resolves the dry friction."""
-FOLLOWED = 2.785
-"""Largest rate of decay that a step of the classical fourth-order method follows, times the step."""
 
 
 def sticking(model: Model) -> Model:
@@ -62,15 +60,10 @@ def too_steep_said(model: Model, dt: float) -> tuple[str, ...]:
 
 def _too_steep(model: Model, dt: float = DEFAULT_DT) -> Iterator[tuple[Effect, str]]:
     """Give the dry laws with the default smoothing whose slope at rest a step cannot follow, and the name of that parameter."""
-    agility = np.diag(np.linalg.inv(_armrs.Arm.from_model(model).inertia(np.zeros(model.n_joints))))
-    for law in model.all_effects:
-        size = catalogue()[law.kind].parameters[0]
-        # Not where the size is a share of the force through the joint: so steep, such friction mostly has no unique solution if set-valued.
-        if law.joint is None or size.unit != "N m":
-            continue
+    # Not friction whose size is a share of the force through the joint: so steep, it mostly has no unique solution if set-valued.
+    for law, longest in zip(model.all_effects, _armrs.Rig(model).longest_steps(), strict=True):
         for smoothing in _smoothings(law):
-            rate = law.parameters[size.name] / smoothing.default * agility[law.joint - 1]
-            if law.parameters[smoothing.name] == smoothing.default and rate * dt > FOLLOWED:
+            if dt > longest and law.parameters[smoothing.name] == smoothing.default:
                 yield law, smoothing.name
 
 

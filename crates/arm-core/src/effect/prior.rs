@@ -20,6 +20,8 @@ pub struct Prior {
     pub typical: f64,
     /// Whether every passive joint has it.
     pub passive: bool,
+    /// Lowest and highest frequency that it has where it swings \[Hz\].
+    pub frequencies: [f64; 2],
 }
 
 /// Effects of one mechanism, whose members may be indistinguishable by movements.
@@ -193,6 +195,7 @@ impl Prior {
             family: None,
             typical: 0.0,
             passive: false,
+            frequencies: [0.0, f64::INFINITY],
         }
     }
 
@@ -239,5 +242,19 @@ impl Prior {
     /// With another nature.
     pub const fn of_nature(self, nature: Nature) -> Self {
         Self { nature, ..self }
+    }
+
+    /// With a lowest and a highest frequency \[Hz\].
+    pub const fn between(self, low: f64, high: f64) -> Self {
+        Self {
+            frequencies: [low, high],
+            ..self
+        }
+    }
+
+    /// Whether it occurs with a frequency \[Hz\].
+    pub fn has_frequency(&self, frequency: f64) -> bool {
+        let [low, high] = self.frequencies;
+        (low..=high).contains(&frequency)
     }
 }

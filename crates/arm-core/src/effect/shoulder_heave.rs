@@ -17,8 +17,10 @@ impl Law for ShoulderHeave {
         parameters: &WAVE,
         states: 0,
     };
+    // The trunk breathes at 0.2 to 0.5 Hz and sways below 1 Hz, the heart beats at 1 to 3 Hz.
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).varying(&[2, 3]).small(1e-4)])
-        .of_nature(Nature::Periodic);
+        .of_nature(Nature::Periodic)
+        .between(0.0, 3.0);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         add_wave(p, &mut setup.heave);

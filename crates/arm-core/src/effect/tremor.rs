@@ -21,8 +21,10 @@ impl Law for Tremor {
         ],
         states: 0,
     };
+    // The slowest tremor that is known, myorhythmia, has 1 to 4 Hz.
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1, 2])])
         .of_nature(Nature::Rhythm)
+        .between(1.0, f64::INFINITY)
         .in_family(Family::Muscle);
 
     #[inline]

@@ -15,7 +15,6 @@ use crate::data::session::{ComparisonMode, Session};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::{Columns, Rows};
-use crate::trial_specific::component::SLOWEST_RHYTHM;
 
 /// All candidates of a session with their responses; those that the movements do not excite are left out.
 pub struct Library {
@@ -263,8 +262,7 @@ fn ask<const N: usize>(
             }
             shape
         };
-        // The robot and the shoulder may swing more slowly than muscles.
-        let occurs = |wave: &&[f64; 2]| nature != Nature::Rhythm || wave[0] >= SLOWEST_RHYTHM;
+        let occurs = |wave: &&[f64; 2]| plain.kind.prior().has_frequency(wave[0]);
         shapes = waves.iter().filter(occurs).map(shape).collect();
     }
     let joint = plain.index.min(N - 1);

@@ -35,7 +35,8 @@ pub(crate) fn held(effect: &Effect<f64>) -> Option<usize> {
 /// Smallest and largest value that a fit may give a refined shape.
 ///
 /// A relaxation that takes longer than a trial is a spring, one that is over between two samples is a viscosity; an excess of friction
-/// that fades below [`CREEP`] is the friction of a joint that creeps, and one that does not fade up to the fastest speed is Coulomb's.
+/// that fades below [`CREEP`] is the friction of a joint that creeps, and one that does not fade up to the fastest speed is Coulomb's. A
+/// moment that rises less than e-fold over the range of the joint is a spring.
 fn limits<const N: usize>(
     session: &Session<N>,
     effect: &Effect<f64>,
@@ -53,9 +54,20 @@ fn limits<const N: usize>(
             (SHORTEST, lengths.fold(SHORTEST, f64::max))
         }
         "rad/s" => (CREEP, fastest(session, effect.index).max(CREEP)),
+        "1/rad" => ((1.0 / range(session, effect)).min(info.max), info.max),
         _ => (info.min, info.max),
     };
     (f64::max(info.min, least), f64::min(info.max, most))
+}
+
+/// Range of the angle on which an effect of a joint depends \[rad\]; of one that crosses two joints, of both together.
+fn range<const N: usize>(session: &Session<N>, effect: &Effect<f64>) -> f64 {
+    let first = effect.index - usize::from(effect.kind.crosses() && effect.index > 0);
+    let of_joint = |j: usize| {
+        let angles = || session.trials.iter().flat_map(|t| t.q.iter().map(|q| q[j]));
+        angles().fold(f64::NEG_INFINITY, f64::max) - angles().fold(f64::INFINITY, f64::min)
+    };
+    (first..=effect.index).map(of_joint).sum()
 }
 
 /// Fastest mean speed of a joint over a quarter of a second \[rad/s\], which noise of the angles hardly changes.
@@ -142,6 +154,20 @@ mod tests {
         };
         assert_eq!(of("stribeck", "smoothing"), whole("stribeck", 2));
         assert_eq!(of("stretch_reflex", "latency"), whole("stretch_reflex", 3));
+    }
+
+    #[test]
+    fn a_moment_must_rise_e_fold_over_the_range_of_its_joint() {
+        let mut session = of_lengths(&[4.0, 4.0]);
+        session.trials[0].q[7] = Joints::from([-0.2]);
+        session.trials[1].q[9] = Joints::from([0.3]);
+        let steepness = |session: &Session<1>| limits(session, &Effect::new(Kind::EndRange, 0), 2);
+        assert_eq!(steepness(&session), (2.0, 50.0));
+        session.trials[1].q[9] = Joints::from([-0.19]);
+        assert_eq!(steepness(&session), (5.0, 50.0));
+        assert_eq!(steepness(&of_lengths(&[4.0])), (50.0, 50.0), "at rest");
+        let spring = Effect::<f64>::new(Kind::EndRange, 0).with(&[1.0, 0.0, 2.0]);
+        assert!(is_plainer(&[(2, (2.0, 50.0))], &spring));
     }
 
     #[test]

@@ -28,6 +28,8 @@ const NOISY: f64 = 0.3;
 const REST_SD: f64 = 1.0;
 /// Range of an angle in the common band up to which its joint hardly moves \[rad\]: a slip of a sensor or a soft orthosis makes as much.
 pub const STILL: f64 = 0.01;
+/// Share of the furthest turning joint's range below which a joint turns little: friction that holds it nearly all the time lets it slip.
+const LITTLE: f64 = 0.5;
 /// Furthest start of a segment from its literature values, in standard deviations.
 const FURTHEST_START: f64 = 3.0;
 
@@ -215,15 +217,17 @@ impl<const N: usize> Session<N> {
         })
     }
 
-    /// Which joints are at rest except for noise, or have a viscosity far above the usual ones, which is friction that holds the joint
-    /// nearly all the time.
+    /// Which joints are at rest except for noise, or turn little with a viscosity far above the usual ones: that is friction which holds
+    /// the joint nearly all the time. In a joint that turns as far as others it is dry friction at one speed.
     fn hardly_moving(&self, laws: &[WithStd]) -> [bool; N] {
-        let mut still = self.reach().map(|reach| reach <= STILL);
+        let reach = self.reach();
+        let furthest = reach.into_iter().fold(0.0, f64::max);
+        let mut still = reach.map(|reach| reach <= STILL);
         for (law, _) in laws {
             let expected = law.kind.prior().typical * self.weight_moment(law.index);
-            let in_tar =
+            let resists =
                 law.kind.family() == Family::Rate && law.parameters[0] > FURTHEST * expected;
-            still[law.index] |= in_tar;
+            still[law.index] |= resists && reach[law.index] < LITTLE * furthest;
         }
         still
     }
@@ -308,21 +312,26 @@ mod tests {
         assert_eq!(still(0.0105), [false, true]);
     }
 
-    /// Typical is a fifth of the weight moment in N m s/rad; no other law is as if in tar.
+    /// Typical is a fifth of the weight moment in N m s/rad.
     #[test]
-    fn a_joint_with_four_times_the_expected_viscosity_hardly_moves() {
-        let mut session = resting(100.0);
-        session.trials[0].q.iter_mut().zip(0..).for_each(|(q, i)| {
-            let at = libm::sin(core::f64::consts::PI * f64::from(i) / 100.0);
-            *q = Joints::from([at, at]);
-        });
-        let still = |kind, times: f64| {
+    fn a_joint_that_turns_little_with_four_times_the_expected_viscosity_hardly_moves() {
+        let turning = |share: f64| {
+            let mut session = resting(100.0);
+            session.trials[0].q.iter_mut().zip(0..).for_each(|(q, i)| {
+                let at = libm::sin(core::f64::consts::PI * f64::from(i) / 100.0);
+                *q = Joints::from([at, share * at]);
+            });
+            session
+        };
+        let still = |session: &Session<2>, kind, times: f64| {
             let expected = Kind::Viscous.prior().typical * session.weight_moment(1);
             session.hardly_moving(&[(Effect::new(kind, 1).with(&[times * expected]), 0.1)])
         };
-        assert_eq!(still(Kind::Viscous, 3.9), [false, false]);
-        assert_eq!(still(Kind::Viscous, 4.1), [false, true]);
-        assert_eq!(still(Kind::Elastic, 4.1), [false, false]);
+        let mut session = turning(0.45);
+        assert_eq!(still(&session, Kind::Viscous, 3.9), [false, false]);
+        assert_eq!(still(&session, Kind::Viscous, 4.1), [false, true]);
+        assert_eq!(still(&session, Kind::Elastic, 4.1), [false, false]);
+        assert_eq!(still(&turning(0.55), Kind::Viscous, 4.1), [false, false]);
 
         let mut dry = session.passive(Effect::new(Kind::Coulomb, 1).with(&[0.1, 0.0]));
         session.hold(&mut dry);

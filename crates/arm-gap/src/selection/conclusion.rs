@@ -126,6 +126,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut settled = self.with_friction_at_rest(settled)?;
         let base = loop {
             let (with_base, base) = self.judged_base(settled, state.scale)?;
+            // What a name with shapes of its own made too weak may stand in for that name.
+            if let Some(instead) = self.with_base_instead(&with_base.0, &with_base.1)? {
+                settled = instead;
+                continue;
+            }
             let before = with_base.0.asked.len();
             settled = self.pruned(with_base, &state.calibrated, state.scale)?;
             if settled.0.asked.len() == before {

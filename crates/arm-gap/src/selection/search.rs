@@ -31,8 +31,8 @@ const WIDTH: usize = 12;
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Searches for what the model lacks.
     ///
-    /// First effects that differ between trials, from the differences of repeats; then lasting effects; then a ripple of the
-    /// robot, in what is left; and everything that was set apart or found on the way is tested again.
+    /// First effects that differ between trials, from the differences of repeats; then lasting effects, with a slow oscillation among them
+    /// where one is plain; then a ripple of the robot, in what is left; and everything that was set apart or found on the way is tested again.
     ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
@@ -53,11 +53,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             progress("looking at single trials", 0.05)?;
             settled = self.set_apart(settled, &mut apart)?;
         }
-        let mut state = self.search_from(settled, None, progress)?;
-        state = self.or_as_it_was(state, &mut apart, |all, state, _| {
-            all.with_base_reconsidered(state, None, progress)
+        if led && settled.0.leaves_much() {
+            // Before other effects are named that bend to it.
+            let scale = settled.0.cost / settled.0.rows as f64;
+            apart.periodic = self.in_phase((&settled.0, &settled.1), scale);
+        }
+        let mut state = self.search_from(settled, apart.periodic, progress)?;
+        state = self.or_as_it_was(state, &mut apart, |all, state, apart| {
+            all.with_base_reconsidered(state, apart.periodic, progress)
         })?;
         if led {
+            // One that was not named may have stood for another.
+            let swings = |c: &Candidate| c.kind().prior().nature.swings();
+            apart.periodic = apart
+                .periodic
+                .filter(|_| state.current.asked.iter().any(swings));
             state = self.or_as_it_was(state, &mut apart, |all, state, apart| {
                 all.rhythm_asked_again(state, apart, progress)
             })?;

@@ -8,9 +8,6 @@ use crate::candidates::candidate::price;
 /// Frequency below which a ripple must keep its phase in every trial and is tested like other effects \[Hz\]: movements and
 /// what a model lacks of them reach that far.
 pub(crate) const SLOW: f64 = 3.0;
-/// Slowest rhythm of muscles \[Hz\]: the slowest tremor that is known, myorhythmia, has 1 to 4 Hz. What swings more slowly is the robot or the
-/// shoulder, or what a model misses of the movement.
-pub(crate) const SLOWEST_RHYTHM: f64 = 1.0;
 
 /// An effect that stands apart from the fit of all trials.
 #[derive(Clone, Debug)]

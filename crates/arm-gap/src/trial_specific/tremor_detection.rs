@@ -173,7 +173,8 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// What can swing at a frequency: for each explanation the effects whose swings it adds up.
     fn swings(&self, frequency: f64) -> Vec<Vec<Effect<f64>>> {
         let mut list = Vec::new();
-        for &kind in KINDS {
+        let kinds = KINDS.iter().copied();
+        for kind in kinds.filter(|k| k.prior().has_frequency(frequency)) {
             match kind.prior().nature {
                 Nature::Rhythm => {
                     list.extend((0..N).map(|j| vec![swinging(kind, j, 0, frequency)]));

@@ -1,7 +1,7 @@
 //! The catalogue as candidates: the price of each, where it is tested, and what it finds.
 
-use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
-use arm_gap::candidates::candidate::{THRESHOLD, price};
+use arm_core::effect::{Effect, KINDS, Kind, Place};
+use arm_gap::candidates::candidate::{Candidate, THRESHOLD, price};
 use arm_gap::candidates::library::Library;
 use arm_gap::data::prepared_session::PreparedSession;
 
@@ -70,18 +70,22 @@ fn a_spring_at_two_rest_angles_is_one_spring_between_them() {
     assert!(library.candidates.iter().all(|c| c.effect.index == 1));
 }
 
-/// A wave of 0.5 Hz may be the robot's or the shoulder's; one of 1.3 Hz may also be a tremor.
 #[test]
-fn no_rhythm_of_muscles_is_slower_than_one_hertz() {
+fn muscles_shake_no_slower_than_one_hertz_and_a_trunk_no_faster_than_three() {
     let session = session(&[], (1e-3, 0.1));
     let prepared = PreparedSession::new(&session, 2).expect("a sound session");
     let point = prepared.linearize(&session.given()).expect("a run");
-    let natures = |frequency: f64| {
+    let swinging = |frequency: f64| {
         let library = Library::build(&prepared, &point, Some([frequency, 0.4]));
         let candidates = library.expect("questions").candidates;
-        let has = |nature| candidates.iter().any(|c| c.kind().prior().nature == nature);
-        [Nature::Periodic, Nature::Rhythm].map(has)
+        let kinds = candidates.iter().map(Candidate::kind);
+        let mut swinging: Vec<_> = kinds.filter(|k| k.prior().nature.swings()).collect();
+        swinging.dedup();
+        let mut names: Vec<_> = swinging.iter().map(|k| k.info().kind).collect();
+        names.sort_unstable();
+        names
     };
-    assert_eq!(natures(0.5), [true, false]);
-    assert_eq!(natures(1.3), [true, true]);
+    assert_eq!(swinging(0.5), ["robot_ripple", "shoulder_heave"]);
+    assert_eq!(swinging(1.3), ["robot_ripple", "shoulder_heave", "tremor"]);
+    assert_eq!(swinging(5.0), ["robot_ripple", "tremor"]);
 }

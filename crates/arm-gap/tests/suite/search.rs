@@ -84,6 +84,31 @@ fn the_laws_of_a_passive_joint_are_named_with_what_could_stand_in_their_place() 
 }
 
 #[test]
+fn a_heaving_shoulder_is_named_beside_the_laws_of_joints_that_bend_to_it() {
+    let of = |kind: &str, index, values: &[f64]| {
+        Effect::new(Kind::named(kind).expect("known"), index).with(values)
+    };
+    let heave = [4e-4, 6e-3, 0.6, -1.3];
+    let session = little_known(&[
+        of("elastic", 0, &[0.6, -1.2]),
+        of("elastic", 1, &[0.8, 0.8]),
+        of("coulomb", 1, &[0.06, 0.0]),
+        of("biarticular", 1, &[0.6, 0.9, -0.2]),
+        of("shoulder_heave", 0, &heave),
+    ]);
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    let named = &finding.amended.hypothesis.named;
+    let found = named
+        .iter()
+        .find(|e| e.kind.info().kind == "shoulder_heave");
+    let found = found.expect("a heave").parameters;
+    assert!((found[1] / heave[1] - 1.0).abs() < 0.05, "{found:?}");
+    assert!((found[2] - heave[2]).abs() < 0.01, "{found:?}");
+    assert!(finding.lack[1].z < 4.0, "{:?}", finding.lack);
+}
+
+#[test]
 fn whole_trials_tell_whether_friction_sticks_or_creeps() {
     let of = |kind: &str, index, values: &[f64]| {
         Effect::new(Kind::named(kind).expect("known"), index).with(values)

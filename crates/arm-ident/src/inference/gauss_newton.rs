@@ -1,9 +1,10 @@
 //! Gauss and Newton's method on the rows of all trials: fit, linearise again at the estimate and, where the motion is simulated, simulate again.
 
+use arm_sim::Springs;
+
 use crate::error::IdentError;
 use crate::inference::updated_model::{updated, values};
 use crate::inference::weighted_fit::{Solved, weighted};
-use crate::regression::assistance::Assistance;
 use crate::regression::equation::Building;
 use crate::regression::instrument::Instrument;
 use crate::regression::measured_motion::{measured, widened};
@@ -39,7 +40,7 @@ pub(crate) struct Task<'a, const N: usize> {
     pub cutoff: f64,
     pub simulate: bool,
     /// What helps simulated arms to move as measured.
-    pub assistance: Option<Assistance<N>>,
+    pub assistance: Option<Springs<N>>,
     pub scale_free: bool,
     pub threads: usize,
 }
@@ -93,7 +94,7 @@ impl<const N: usize> Task<'_, N> {
             // Rows take most of the memory: those of the last round make room first.
             prepared.clear();
             let delay = delay(unknowns, &at.x);
-            let how = (cutoff, simulate, delay, assistance.as_ref());
+            let how = (cutoff, simulate, delay, assistance);
             prepared = match prepare((&at.model, unknowns), trials, how, threads) {
                 Ok(prepared) => prepared,
                 // A step too far makes an arm that cannot be simulated: half of it is a step too.
@@ -237,7 +238,7 @@ fn share_of_step(last: f64, moved: f64, before: f64) -> f64 {
 fn prepare<const N: usize>(
     (model, unknowns): (&Model<N>, &[Unknown]),
     trials: &[Trial<N>],
-    (cutoff, simulate, delay, assistance): (f64, bool, f64, Option<&Assistance<N>>),
+    (cutoff, simulate, delay, assistance): (f64, bool, f64, Option<Springs<N>>),
     threads: usize,
 ) -> Result<Vec<Pieces>, IdentError> {
     let model = if simulate {

@@ -1,5 +1,7 @@
 //! The joint method: all joints at once, all linear effects, physical consistency, honest intervals.
 
+use arm_sim::Springs;
+
 use crate::error::IdentError;
 use crate::inference::cutoff::best_cutoff;
 use crate::inference::estimate::Identified;
@@ -7,7 +9,6 @@ use crate::inference::gauss_newton::{Settled, Task, can_simulate, fit_trials};
 use crate::inference::sticking::{is_plainly_better, sticking};
 use crate::inference::summary::{Fit, summarise};
 use crate::inference::weighted_fit::explain;
-use crate::regression::assistance::Assistance;
 use crate::regression::measured_motion::{candidates, relative_speed_noise};
 use crate::regression::sensitivity::{HELD, damped};
 use crate::regression::trial::{Model, Tolerance, Trial};
@@ -211,7 +212,7 @@ impl<const N: usize> Task<'_, N> {
         let mut assisted = *self;
         let mut current = from.clone();
         for frequency in FADING {
-            assisted.assistance = Some(Assistance::of_frequency(&current, frequency));
+            assisted.assistance = Some(Springs::of_frequency(&current.chain, frequency));
             let found = assisted.settle(current)?;
             current = found.model;
         }

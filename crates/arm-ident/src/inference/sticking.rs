@@ -3,10 +3,11 @@
 //! Torques cannot decide. Where a joint sticks nothing follows from its row, so the set-valued law would be judged by fewer of them.
 
 use arm_core::effect::Effect;
+use arm_sim::longest_step;
 
 use crate::error::IdentError;
 use crate::regression::measured_motion::low_pass;
-use crate::regression::simulated_motion::{FOLLOWED, LONGEST_STEP, decay_rate, simulated};
+use crate::regression::simulated_motion::{LONGEST_STEP, simulated};
 use crate::regression::trial::{Model, Trial};
 use crate::threads::parallel;
 
@@ -14,8 +15,9 @@ use crate::threads::parallel;
 /// property of an arm, see `arm-core`. First in joints that are nearly as steep as the usual step follows, which `armrs simulate` and `record`
 /// solve as set-valued, then in all.
 pub(crate) fn sticking<const N: usize>(model: &Model<N>) -> Vec<Model<N>> {
-    let limit = NEARLY * FOLLOWED / LONGEST_STEP;
-    let steep = set_valued(model, |effect| decay_rate(&model.chain, effect) > limit);
+    let steep = set_valued(model, |effect| {
+        NEARLY * longest_step(&model.chain, effect) < LONGEST_STEP
+    });
     let all = set_valued(model, |effect| effect.parameters[0] > 0.0);
     let mut models: Vec<Model<N>> = steep.into_iter().chain(all).collect();
     models.dedup_by(|a, b| a.fitted == b.fitted);
@@ -45,7 +47,7 @@ fn is_default(effect: &Effect<f64>, parameter: usize) -> bool {
     effect.parameters[parameter] == effect.kind.info().parameters[parameter].default
 }
 
-/// Share of what the usual step follows from which friction is called steep; estimates of a joint that sticks are not those of its law.
+/// Share of the longest step below which the usual one has to be, or friction is called steep; estimates of a joint that sticks are not those of its law.
 const NEARLY: f64 = 0.5;
 
 /// Standard deviations by which the set-valued law must describe the trials better on the whole.

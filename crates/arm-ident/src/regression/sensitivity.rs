@@ -7,10 +7,9 @@
 
 use arm_core::effect::{Effect, resisting_torque};
 use arm_core::{Joints, Plane, Pose, inertia, inverse_dynamics, jacobian, static_torque};
-use arm_sim::{Change, Recording, Slopes, cubic_weights};
+use arm_sim::{Change, Recording, Slopes, Springs, cubic_weights};
 use nalgebra::SMatrix;
 
-use crate::regression::assistance::Assistance;
 use crate::regression::equation::Building;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
@@ -57,7 +56,7 @@ pub(crate) struct Course<const N: usize> {
     motion: Kinematics<N>,
     parts: usize,
     /// What helped the joints to move as measured.
-    pub assistance: Option<Assistance<N>>,
+    pub assistance: Option<Springs<N>>,
 }
 
 impl<const N: usize> Course<N> {

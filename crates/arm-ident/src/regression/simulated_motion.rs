@@ -6,14 +6,14 @@
 
 use core::ops::ControlFlow;
 
-use arm_core::effect::Effect;
-use arm_core::{Chain, Joints, Pose, Setup, inertia};
+use arm_core::Setup;
 use arm_sim::{
-    Coupling, Drive, Engine, Experiment, HandlePath, Recording, Start, simulate_in_pieces,
+    Coupling, Drive, Engine, Experiment, HandlePath, Recording, Springs, Start, longest_step,
+    simulate_in_pieces,
 };
 
 use crate::error::IdentError;
-use crate::regression::assistance::Assistance;
+use crate::regression::assistance::assist;
 use crate::regression::measured_motion::low_pass;
 use crate::regression::sensitivity::{Course, HELD, parts};
 use crate::regression::trial::{Model, Trial};
@@ -21,9 +21,7 @@ use arm_numerics::NumericsError;
 
 /// Longest simulation step \[s\]; small enough for stiff contacts and smoothed dry friction.
 pub(crate) const LONGEST_STEP: f64 = 0.25e-3;
-/// Largest rate of decay that a step of the classical fourth-order method follows, times the step.
-pub(crate) const FOLLOWED: f64 = 2.785;
-/// The part of it that a run keeps to where smooth dry friction is steep.
+/// The part of the longest step that follows steep dry friction which a run keeps to.
 const SAFELY: f64 = 0.7;
 /// Shortest step, in parts of the longest.
 const MOST_PARTS: f64 = 4.0;
@@ -46,7 +44,7 @@ pub(crate) fn simulated<const N: usize>(
     model: &Model<N>,
     trial: &Trial<N>,
     cutoff: f64,
-    assistance: Option<&Assistance<N>>,
+    assistance: Option<Springs<N>>,
 ) -> Result<Course<N>, IdentError> {
     if trial.base.is_some() {
         return Err(IdentError::MovingBase);
@@ -62,12 +60,12 @@ pub(crate) fn simulated<const N: usize>(
         }));
     };
     let mut experiment = experiment(model, trial, handle, cutoff)?;
-    if let Some(assistance) = assistance {
-        assistance.help(&mut experiment, trial, cutoff)?;
+    if let Some(springs) = assistance {
+        assist(&mut experiment, springs, trial, cutoff)?;
     }
     let recording = moved(&experiment)?;
     let mut course = Course::new(&recording, trial.rate, parts(trial.rate));
-    course.assistance = assistance.copied();
+    course.assistance = assistance;
     drop(recording);
     let allowed = match assistance {
         Some(_) => LIKE_MOVEMENT,
@@ -126,11 +124,11 @@ fn experiment<const N: usize>(
     let interval = 1.0 / trial.rate;
     let times: Vec<f64> = (0..trial.len()).map(|i| i as f64 * interval).collect();
     let parts = parts(trial.rate) as f64;
-    let rates = model.fitted.iter().chain(&model.held);
-    let rate = rates
-        .map(|e| decay_rate(&model.chain, e))
-        .fold(0.0, f64::max);
-    let finer = libm::ceil(rate * LONGEST_STEP / (SAFELY * FOLLOWED)).clamp(1.0, MOST_PARTS);
+    let effects = model.fitted.iter().chain(&model.held);
+    let longest = effects
+        .map(|e| longest_step(&model.chain, e))
+        .fold(f64::INFINITY, f64::min);
+    let finer = libm::ceil(LONGEST_STEP / (SAFELY * longest)).clamp(1.0, MOST_PARTS);
     let steps = parts * libm::ceil(interval / parts / LONGEST_STEP * finer);
     let drive = Drive::Handle {
         path: HandlePath::through_points(&times, &points)?,
@@ -146,20 +144,4 @@ fn experiment<const N: usize>(
     experiment.dt = interval / steps;
     experiment.output_interval = Some(interval / parts);
     Ok(experiment)
-}
-
-/// How fast the slope of smooth dry friction at rest makes the speed of its joint decay, the arm stretched \[1/s\]; zero where it is not smooth, or its
-/// size a share of the force through the joint.
-pub(crate) fn decay_rate<const N: usize>(chain: &Chain<f64, N>, effect: &Effect<f64>) -> f64 {
-    let p = &effect.parameters;
-    match effect.kind.smoothed_by() {
-        Some(smoothing) if p[smoothing] > 0.0 && effect.kind.info().parameters[0].unit == "N m" => {
-            let stretched = inertia(chain, &Pose::new(&Joints::zeros()));
-            let agility = stretched.try_inverse();
-            agility.map_or(0.0, |m| {
-                m[(effect.index, effect.index)] * p[0] / p[smoothing]
-            })
-        }
-        _ => 0.0,
-    }
 }

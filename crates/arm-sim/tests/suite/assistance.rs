@@ -1,7 +1,9 @@
 //! Springs and dampers that pull an arm which the robot leads towards given angles.
 
 use arm_core::effect::{Effect, Kind};
-use arm_sim::{Assistance, Experiment, Interpolation, Series, digest, simulate, simulate_batch};
+use arm_sim::{
+    Assistance, Experiment, Interpolation, Series, Springs, digest, simulate, simulate_batch,
+};
 
 use crate::common::{largest, run, smooth};
 
@@ -13,8 +15,10 @@ fn helped(times: &[f64], towards: &[[f64; 3]]) -> Experiment<3> {
     let series = Series::new("assistance", times, towards, Interpolation::Linear);
     experiment.assistance = Some(Assistance {
         towards: series.expect("a series"),
-        stiffness: STIFFNESS,
-        damping: DAMPING,
+        springs: Springs {
+            stiffness: STIFFNESS,
+            damping: DAMPING,
+        },
     });
     experiment
 }
@@ -46,7 +50,7 @@ fn a_speed_to_pull_towards_is_a_torque_of_the_dampers() {
         let ends = [[0.0; 3], [0.5; 3]];
         let series = Series::new("assistance", &[0.0, 0.5], &ends, Interpolation::Linear);
         assistance.towards = series.expect("a series");
-        assistance.damping = [0.0; 3];
+        assistance.springs.damping = [0.0; 3];
     }
     let damper = |j: usize| Effect::new(Kind::Viscous, j).with(&[DAMPING[j]]);
     sprung.effects.extend((0..3).map(damper));
@@ -62,7 +66,7 @@ fn runs_side_by_side_have_the_bits_of_each_by_itself() {
     let helped = [0.0, 0.5, 1.0].map(|end| helped(&[0.0, 0.5], &[[0.0; 3], [end; 3]]));
     let mut softer = helped[1].clone();
     if let Some(assistance) = &mut softer.assistance {
-        assistance.stiffness[1] *= 0.5;
+        assistance.springs.stiffness[1] *= 0.5;
     }
     let all = [helped.as_slice(), &[softer, smooth(0.5)]].concat();
     for (one, together) in all.iter().zip(simulate_batch(&all, 1)) {

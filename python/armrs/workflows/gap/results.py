@@ -21,12 +21,21 @@ def gap_data(result: GapFound, command: str | None = None) -> dict[str, Any]:
     """Return the result as it is written to JSON: that of `GapFound.to_dict`, what its effects are, and what it rests on."""
     data = {"verb": "gap", **result.to_dict(), "data": data_of(result.dataset), "made_by": origin(command)}
     for effect in data["effects"]:
-        kind = catalogue()[effect["kind"]]
-        effect |= {"summary": kind.summary, "formula": kind.formula}
+        effect |= {"summary": catalogue()[effect["kind"]].summary, "formula": formula_of(effect)}
     for number, alternative in enumerate(_separated(data), start=1):
         alternative["separation"]["file"] = f"separating-{number}.toml"
     data["made_by"] |= {"input_sha256": result.dataset.digest(), "random_numbers": "none"}
     return data
+
+
+def formula_of(effect: Mapping[str, Any]) -> str:
+    """Return the formula of an effect's law; friction that is not smoothed has the sign of the speed."""
+    kind = catalogue()[effect["kind"]]
+    formula = kind.formula
+    for smoothing in (p.name for p in kind.parameters if p.or_zero):
+        if effect["parameters"].get(smoothing, {}).get("value") == 0.0:
+            formula = formula.replace(f"tanh(q̇/{smoothing})", "sgn(q̇)")
+    return formula
 
 
 def _separated(data: Mapping[str, Any]) -> list[dict[str, Any]]:
