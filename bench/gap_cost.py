@@ -41,7 +41,7 @@ def fewer_repeats(trials: tuple[Trial, ...], most: int = 2) -> tuple[Trial, ...]
 
 
 def variants(data: Dataset) -> dict[str, tuple[Dataset, bool]]:
-    """Return the data sets that are analysed, by what is less, and whether only a first look is taken."""
+    """Return the data sets that are analysed, by what is less, and whether only the screening is run."""
     halves = tuple(cut(t, slice(0, len(t) // 2)) for t in data.trials)
     return {
         "as it is": (data, False),

@@ -6,7 +6,7 @@ Each patient of `tests/patients.py` (laws written there anew, tone that drifts f
 twice. In every second one the reflex' gain is a fifth larger or smaller in the second session. Both sessions go through `armrs spasticity`
 and its history; what it calls changed is compared with the truth. With `--laboratory` it is the virtual laboratory of `armrs record` that
 records them: an arm of two segments led by a controlled robot, with cameras, a force sensor, tone and EMG. There the passive stiffness of
-the last two of four patients changes too, and `armrs passive` is asked as well.
+the last two of four patients changes too, and `armrs passive` is run as well.
 
 Exit status: 0 when every figure holds, 1 when one does not.
 """
@@ -67,7 +67,7 @@ def pair(number: int, seed: int, laboratory: bool, counts: dict[str, list[bool]]
 
 def judge(found: armrs.Spasticity, patient: patients.Patient, counts: dict[str, list[bool]]) -> None:
     """Compare the reflex of one session with the truth."""
-    # The shoulder, which is held, is not asked.
+    # The shoulder, which is held, is not tested.
     joint = max(j.joint for j in found.joints)
     seen = next(j.reflex for j in found.joints if j.joint == joint)
     estimates = {**(seen.parameters if seen.found else {}), "viscosity": seen.viscosity, "torque": seen.dry}
@@ -84,7 +84,7 @@ def judge(found: armrs.Spasticity, patient: patients.Patient, counts: dict[str, 
 
 
 def holds(name: str, share: float) -> bool:
-    """Say whether a share is as it should be."""
+    """Return whether a share is as it should be."""
     if name.startswith("interval"):
         return 0.9 <= share <= 0.98
     return share >= (0.95 if "called" in name else 0.9)

@@ -41,7 +41,7 @@ CALIBRATIONS = {
 
 
 def uncalibrated(arm: Model, allowed: Tolerance, draw: np.random.Generator) -> Model:
-    """Return an arm whose sensors are off by what a tolerance allows, as one standard deviation; the handle is held where it is said."""
+    """Return an arm whose sensors are off by what a tolerance allows, as one standard deviation; the handle is held at its stated place."""
     faults = [Effect("angle_offset", j, parameters={"offset": allowed.angle_offset * draw.standard_normal()}) for j in (1, 2)]
     for channel in ("Fy", "Fz"):
         faults.append(Effect("force_bias", channel=channel, parameters={"bias": allowed.force_bias_N * draw.standard_normal()}))

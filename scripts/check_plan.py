@@ -73,7 +73,7 @@ def repetition(arm: Model, planned: Plan, seed: int) -> dict[tuple[str, int | No
         for k, read in enumerate(run.readings, 1):
             name = f"planned {number}"
             trials.append(Trial(f"{name} {k}.csv", name, k, "fit", read.time, read.q, read.force_on_arm, None, read.robot_q))
-    # Believed values as far from the truth as the model says that they may be, moment by moment as identification has them.
+    # Given values as far from the truth as the standard deviations of the model allow, moment by moment as in identification.
     segments = []
     for s in arm.segments:
         a, b, c = draw.standard_normal(3)

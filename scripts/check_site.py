@@ -34,7 +34,7 @@ class Quiet(SimpleHTTPRequestHandler):
 
 
 def main() -> None:
-    """Check every page, and say what is wrong with it."""
+    """Check every page, and return what is wrong with it."""
     program = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUM)), None)
     if program is None:
         sys.exit("check_site: no Chromium: install it, or set CHROMIUM to the program")
@@ -79,7 +79,7 @@ def problems(browser: Browser, home: str, name: str, scheme: Any, width: int) ->
 
 
 loaded: set[str] = set()
-"""What the first page asked for."""
+"""Requests of the first page."""
 
 
 def weight(home: str) -> int:

@@ -88,12 +88,12 @@ def sbom(name: str, description: str, components: list[dict[str, Any]]) -> str:
 
 
 def python_requirements() -> list[str]:
-    """Return what the Python package asks for at run time, without extras."""
+    """Return what the Python package requires at run time, without extras."""
     return list(tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"])
 
 
 def python_component(requirement: str) -> dict[str, Any]:
-    """Return what the Python package asks for as CycloneDX describes it: the user's installation decides on the version."""
+    """Return what the Python package requires as CycloneDX describes it: the user's installation decides on the version."""
     name = re.split(r"[<>=!~; \[]", requirement)[0]
     return {
         "type": "library",

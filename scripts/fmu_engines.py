@@ -1,4 +1,4 @@
-"""What other tools say of our FMUs: the same run through every co-simulation engine, and what public validators find.
+"""Our FMUs in other tools: the same run through every co-simulation engine, and what public validators find.
 
 The bits must be those of the slave in Python; nothing may be found. `pip install fmpy libcosimpy ecospy tbb
 fmu-manipulation-toolbox`, and `LD_LIBRARY_PATH` with the library tbb for ecos; what is not installed is left out.
@@ -62,7 +62,7 @@ def container(path: Path, step: float) -> list[float]:
         unknown.dependencies = unknown.dependenciesKind = None
     outer.coSimulation.fixedInternalStepSize = step
     for v in outer.modelVariables:
-        # The arm starts where it was exported to; the container has nothing to say.
+        # The arm starts where it was exported to; the container sets nothing.
         v.start, v.initial = None, "calculated" if v.causality == "output" else None
     mappings = {v: [(arm, known[v.name])] for v in outer.modelVariables if v.name in NAMES}
     configuration = Configuration(False, outer, [arm], [], mappings)

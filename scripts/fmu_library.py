@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def option(name: str) -> str:
-    """Return the word after an option, or nothing."""
+    """Return the argument after an option, or nothing."""
     return sys.argv[sys.argv.index(name) + 1] if name in sys.argv[:-1] else ""
 
 

@@ -26,7 +26,7 @@ FAMILIES = ("null", "single", "double", "little_known")
 FIRST_SEED = 80_000
 """Seed of the first session: those below 100 000 are for development."""
 RIGS = ("dfki_a0", "dfki_c1", "pendulum_single", "pendulum_double", "pendulum_triple")
-"""Folders of measured rigs that are asked where `--rigs` has them."""
+"""Folders of measured rigs that are analysed where `--rigs` has them."""
 MOVEMENT = '[movement]\nwaypoints_deg = [[-60, 50], [-30, 85], [-60, 50]]\nspeed_rad_s = 0.8\nacceleration_rad_s2 = 2.4\nshape = "smooth"\n'
 MOST_SHOWN = 5
 """Keys that are named of one result that differs."""

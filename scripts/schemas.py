@@ -1,7 +1,7 @@
 """Write the JSON Schemas of the files that are written by hand, so that editors complete and check them.
 
 Run with the project's own Python after a build: `.venv/bin/python scripts/schemas.py`. A test compares the files with the catalogue.
-In a file, `#:schema PATH/model.schema.json` as the first line tells editors with a TOML language server.
+In a file, `#:schema PATH/model.schema.json` as the first line is read by editors with a TOML language server.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import pytest
 
 from armrs._armrs import verdict_of
 from armrs.io import tomlfile
-from armrs.io.raw.text import read_text_table
+from armrs.io.raw.text import decoded_lines, table_of
 from armrs.io.samples import read_samples, write_samples
 from armrs.report import html, series
 
@@ -57,8 +57,9 @@ def test_a_spreadsheet_is_read_as_it_was_written(values: list[list[float]], look
     separator, mark = look
     lines = [separator.join(["Zeit (s)", "Höhe", "Kraft y"]), *(separator.join(repr(v).replace(".", mark) for v in row) for row in values)]
     with folder() as out:
-        (out / "x.csv").write_bytes((end.join(lines) + end).encode(encoding))
-        read = read_text_table(out / "x.csv")
+        path = out / "x.csv"
+        path.write_bytes((end.join(lines) + end).encode(encoding))
+        read = table_of(path, *decoded_lines(path))
     assert [c.name for c in read.columns] == ["Zeit (s)", "Höhe", "Kraft y"]
     assert np.array_equal(np.column_stack([c.values for c in read.columns]), np.array(values))
 

@@ -1,10 +1,10 @@
-"""Run armrs on changed files and judge what it does: `python bench/fuzz/harness.py --cases 20000`.
+"""Run armrs on changed files and check what it does: `python bench/fuzz/harness.py --cases 20000`.
 
-Asked of every case: a status of 0, 1, 2, 130 or 143 and no traceback; at most 10 s of processor time and the stated memory; nothing left
+Required of every case: a status of 0, 1, 2, 130 or 143 and no traceback; at most 10 s of processor time and the stated memory; nothing left
 behind after a refusal, neither the output folder nor temporary files. The seed gives the same cases again; each that fails is kept below
 `--keep` with the command and what it printed.
 
-Ctrl-C ends it and tells of the cases that were run.
+Ctrl-C ends it and reports the cases that were run.
 
 A case takes milliseconds: it runs in a process that is forked from one in which everything is loaded, 1000 to a process; the folders are in
 memory where the system has such; and of the cases only one in 20 draws its figures, while the others write an empty image in their place.
@@ -50,7 +50,7 @@ SECONDS = 10.0
 WAIT = 120.0
 """On the clock, without any work, after which a process is taken to wait for something that never comes."""
 TOO_LONG = 60.0
-"""Of processor time, after which nobody waits for the end of a case."""
+"""Limit of processor time of a case."""
 MEMORY = 4 << 30
 """Address space beyond that of a process that has read nothing [bytes]."""
 AT_ONCE = 1000
@@ -74,7 +74,7 @@ class Most:
     memory : float
         Resident memory of the process that ran it [MiB].
     long : int
-        Cases that asked for long runs, and got on.
+        Cases with long runs that made progress.
     """
 
     seconds: float = 0.0
@@ -205,13 +205,13 @@ def run(case: Case, place: Place) -> tuple[float, list[str]]:
 
 
 def advances(said: str) -> bool:
-    """Return whether a command told that it gets on: a changed file may ask for a run of 1000 s, which takes its time."""
+    """Return whether a command reported progress: a changed file may define a run of 1000 s, which takes long."""
     shares = [int(share) for share in re.findall(r", (\d+) %, after", said)]
     return len(shares) > 1 and shares == sorted(shares) and shares[0] < shares[-1]
 
 
 def child(pipe: int, numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, home: Path) -> None:
-    """Run some cases and tell about each on the pipe."""
+    """Run some cases and report each on the pipe."""
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() if Path("/proc/self/statm").exists() else 0
     if used:
         resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
@@ -284,7 +284,7 @@ def batch(numbers: range, start: int, seeds: tuple[Seed, ...], folder: Path, hom
 
 
 def processor_time(pid: int) -> float:
-    """Return what a process has used [s]: on a busy machine it works for a long time without a word. Zero where nothing tells."""
+    """Return what a process has used [s]: on a busy machine it may work for a long time without output. Zero where it is unknown."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
@@ -293,7 +293,7 @@ def processor_time(pid: int) -> float:
 
 
 def keep(case: Case, why: str, home: Path, place: Path) -> None:
-    """Keep what is needed to look at a case."""
+    """Keep what is needed to examine a case."""
     place = place / str(case.number)
     place.mkdir(parents=True, exist_ok=True)
     (place / Path(case.seed.file).name).write_bytes(case.content)
@@ -343,7 +343,7 @@ def main() -> int:
 
 
 def accepted_at_first(seeds: tuple[Seed, ...], place: Place) -> None:
-    """Say which commands are refused on files that were not changed, whose mutations would show little.
+    """Return which commands are refused on files that were not changed, whose mutations would show little.
 
     What they load, compile and read once is then in this process, of which those of the cases are copies.
     """

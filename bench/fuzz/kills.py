@@ -1,6 +1,6 @@
 """Kill armrs at random times, then call it again: `python bench/fuzz/kills.py --kills 1000`.
 
-Asked after every kill: the same command works at once, its files are those of a run that nobody disturbed, nothing that was not there
+Required after every kill: the same command works at once, its files are those of an undisturbed run, nothing that was not there
 before is left beside them, and a session that was reported as added to a history is in it.
 
 A verb runs in a process that is forked from one in which everything is loaded, and one kill in 10 is of a verb that draws its figures,

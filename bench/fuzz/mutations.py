@@ -1,4 +1,4 @@
-"""Changes that know the structure of a format: a number becomes another kind of number, a key is lost, a cell is doubled."""
+"""Changes that follow the structure of a format: a number becomes another kind of number, a key is lost, a cell is doubled."""
 
 from __future__ import annotations
 

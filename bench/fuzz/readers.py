@@ -42,7 +42,7 @@ LONGEST = 1 << 16
 
 
 def main() -> None:
-    """Fuzz one reader until libFuzzer is told to end."""
+    """Fuzz one reader until libFuzzer is stopped."""
     if len(sys.argv) < 2 or sys.argv[1] not in READERS:
         raise SystemExit(f"found {sys.argv[1:2]}, allowed {', '.join(READERS)}")
     read, suffix, accepted = READERS[sys.argv.pop(1)]

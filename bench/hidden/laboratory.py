@@ -2,8 +2,8 @@
 
     python bench/hidden/laboratory.py --seed 60001 --count 12 -o out/hidden/laboratory
 
-What varies is read from `bench/sweep/little_known/SWEEP.toml`; `armrs record` makes each session. The simulator is the one that is judged,
-behind a robot controller and sensors of its own, so that this world tells whether a first day is answered, and whether intervals hold; not
+What varies is read from `bench/sweep/little_known/SWEEP.toml`; `armrs record` makes each session. The simulator is the one under test,
+behind a robot controller and sensors of its own, so this world shows whether a first day gives results, and whether intervals hold; not
 whether another's laws are recognised.
 """
 

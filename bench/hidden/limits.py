@@ -4,7 +4,7 @@
 
 For each session with one effect of the catalogue: the change that it makes in the angles and forces of the trials to fit, whitened with
 the true noise, less what segments within their uncertainty, calibration within its tolerance and the placing of the handle could make
-of it; in units of five standard deviations. It is the best that a method could do which knows the noise and looks for this one effect
+of it; in units of five standard deviations. It is the best possible for a method that is given the noise and searches for this one effect
 only. The changes are those of the native engine with the catalogue's law.
 """
 

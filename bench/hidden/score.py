@@ -1,4 +1,4 @@
-"""Run `armrs gap` on sessions with hidden effects, and score what it says.
+"""Run `armrs gap` on sessions with hidden effects, and score its results.
 
     python bench/hidden/score.py out/hidden/scored [--jobs 2] [--again] [--only-score] [--timeout 600]
 
@@ -34,7 +34,7 @@ OPEN = 1.5
 SEEN = 2.0
 """An effect counts for recall where it is at least this many times as large as the answer's `would_have_seen` says."""
 SLIP_TIME = 0.5
-"""A slip is told where its start is off by less than this [s]."""
+"""A slip counts as found where its start is off by less than this [s]."""
 SHAPES = [
     "rest",
     "ratio",
@@ -52,7 +52,7 @@ SHAPES = [
     "breakdown",
     "recovery",
 ]
-"""Parameters that say what an effect is like; the others say how large it is."""
+"""Parameters of the shape of an effect; the others are its size."""
 
 SAME = (("inertia", 1), ("motor_inertia", 1))
 """A rotor in the first joint and inertia of the first segment are one term of the equation of motion: either name is right."""
@@ -221,7 +221,7 @@ def judge(truth: Json, answer: Json) -> Json:
 def as_in_file(truth: Json, force_on: str | None) -> Json:
     """Return the truth with biases and drifts of the force as the file's own channels show them.
 
-    The world counts them as of the force on the arm; `armrs gap` speaks of the channel that the user sees.
+    The world counts them as of the force on the arm; `armrs gap` reports the channel of the data set.
     """
     if force_on != "robot":
         return truth
@@ -243,7 +243,7 @@ def force_on(folder: Path) -> str | None:
 
 
 def record(folder: Path) -> Json:
-    """Return the line of a session: what was hidden, what was said, how that compares."""
+    """Return the line of a session: what was hidden, what was reported, how that compares."""
     truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
     truth = as_in_file(truth, force_on(folder))
     line = {
@@ -469,7 +469,7 @@ def fine(line: Json) -> bool:
 
 
 def confusions(lines: list[Json]) -> str:
-    """Return what was said where the naming is not right, most frequent first, with the sessions."""
+    """Return what was reported where the naming is not right, most frequent first, with the sessions."""
     said: Counter[tuple[str, str]] = Counter()
     where: dict[tuple[str, str], list[str]] = {}
     for line in lines:
@@ -487,7 +487,7 @@ def confusions(lines: list[Json]) -> str:
 
 
 def criteria(lines: list[Json]) -> list[tuple[str, str, bool | None]]:
-    """Return what is asked for, what was found, and whether that holds (None where there was nothing to see)."""
+    """Return what is required, what was found, and whether that holds (None where there are no data)."""
 
     def ratio(some: list[Json], holds: Callable[[Json], bool]) -> float:
         return sum(line["error"] is None and bool(holds(line)) for line in some) / len(some) if some else math.nan

@@ -51,7 +51,7 @@ SETUPS: dict[str, tuple[Change, str]] = {
     "of the elbow by 0.5 rad": (offset(1, 0.5), "(another zero: q2 is "),
     "of the last joint by 1 rad": (offset(-1, 1.0), "(another zero: q"),
 }
-"""What is done to a session, and what the refusal says of it; the first is what is right."""
+"""What is done to a session, and the refusal of it; the first is the right setup."""
 
 
 def refusal(data: Dataset, change: Change, *, robot: bool) -> str:

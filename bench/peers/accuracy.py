@@ -33,7 +33,7 @@ def references(peers: dict[str, Peer]) -> tuple[dict[str, np.ndarray], list[dict
 def choose(peers: dict[str, Peer], items: Iterable[Measured], right: dict[str, np.ndarray]) -> dict[str, dict[str, Any]]:
     """Return for every item with a ladder its largest rung that is right, with its error and that of the rung before.
 
-    Where none is right, the last one is taken: its error says so.
+    Where none is right, the last one is taken, with its error.
     """
     chosen: dict[str, dict[str, Any]] = {}
     for item in items:

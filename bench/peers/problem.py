@@ -36,7 +36,7 @@ SIZES = (1_000, 10_000, 100_000, 1_000_000)
 KNOWN_WITHIN = 0.3
 """Half width of the box around the masses of the cascade, relative."""
 MASS_ERROR = np.array([1.08, 0.92, 1.08])
-"""What the cascade believes of the masses, relative to the truth."""
+"""Prior means of the masses in the cascade, relative to the truth."""
 GUESS = np.tile([0.1, 1.0], 3)
 """Where the fit by simulation starts: viscosity and stiffness of each joint."""
 TRUE = np.array([0.15, 0.4, 0.25, 0.6, 0.2, 0.5])
@@ -134,7 +134,7 @@ def box() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def mjcf(led: bool) -> str:
-    """Return the arm for MuJoCo, free or with joints that resist and a spring at its tip; flags take off what nobody else computes."""
+    """Return the arm for MuJoCo, free or with joints that resist and a spring at its tip; flags remove what no other tool computes."""
     bodies = ""
     for j in reversed(range(3)):
         joint = f'damping="{VISCOSITY}" stiffness="{STIFFNESS}"' if led else ""

@@ -1,4 +1,4 @@
-"""The tools as programs: compiled where they need it, started, asked."""
+"""The tools as programs: compiled where they need it, started, called."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Peer:
     def __init__(self, command: list[str]) -> None:
         self.command = command
         self._program = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        # Its first answer, to a question that nobody knows, says that it runs.
+        # Its first response, to an unknown request, shows that it runs.
         self.ask("ready")
 
     def ask(self, task: str) -> Any:
-        """Return what the program answers; None where it knows no such task."""
+        """Return the response of the program; None where it has no such task."""
         assert self._program.stdin and self._program.stdout
         try:
             self._program.stdin.write(f"{task}\n")

@@ -25,7 +25,7 @@ trials = tuple(
     )
     for k, read in enumerate(run.readings, start=1)
 )
-# The model handed over is 10 % too heavy and knows of no brakes.
+# The given model is 10 % too heavy and has no brakes.
 session = armrs.Dataset("an example", handed_over(truth), trials, force_on="robot", synthetic=True)
 
 with tempfile.TemporaryDirectory() as folder:

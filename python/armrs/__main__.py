@@ -18,7 +18,7 @@ def main() -> None:
         status, at_once = getattr(end, "status", 130), True
     if at_once:
         # Once an interrupt has passed through a string that is run, as libraries do while they load, Python ends by its own SIGINT
-        # whatever `sys.exit` says (CPython, `pymain_run_module`).
+        # despite `sys.exit` (CPython, `pymain_run_module`).
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError):
                 stream.flush()

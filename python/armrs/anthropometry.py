@@ -109,7 +109,7 @@ def literature_model(subject: Subject, lengths: Sequence[float | None] | None = 
     Raises
     ------
     BadInput
-        When the subject says too little.
+        When values of the subject are missing.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """The catalogue of effects, as the compiled core states it.
 
-The core owns the list: nothing here knows the name of an effect. Where the compiled module is absent, `catalogue()` is empty and
+The list is in the core: no effect is named here. Where the compiled module is absent, `catalogue()` is empty and
 effects are only checked for their form.
 """
 
@@ -66,17 +66,17 @@ class Kind:
     reference: str
     parameters: tuple[Parameter, ...]
     address: str | None = None
-    """What else an effect of this kind must say: "joint", "channel" or nothing (None)."""
+    """What else an effect of this kind must state: "joint", "channel" or nothing (None)."""
     first_joint: int = 1
     """Lowest joint at which it can stand; 2 where it also acts in the joint before."""
     family: str = ""
-    """The family of effects that it belongs to: of its members movements may not tell one from another."""
+    """The family of effects that it belongs to: its members may be indistinguishable by movements."""
     feels_activity: bool = False
-    """Whether it depends on the activity of muscles, which `emg_*` columns and `[[muscle]]` of a data set tell."""
+    """Whether it depends on the activity of muscles, given by `emg_*` columns and `[[muscle]]` of a data set."""
     rate_independent: bool = False
     """Whether its torque is a constant, or one whose sign alone follows the motion: what a quasi-static analysis can find."""
     searched: bool = True
-    """Whether `armrs gap` asks for it; others are simulated and identified where a model or `with_effects` has them."""
+    """Whether `armrs gap` searches for it; others are simulated and identified where a model or `with_effects` has them."""
     own: bool = False
     """Whether it was declared by `armrs.own_effect`, and is no part of the catalogue that every installation has."""
 

@@ -108,7 +108,7 @@ def threads(value: object) -> int:
 
 
 def bits(place: str, value: object) -> int:
-    """Return the bits of a converter over its whole range: no more than a number of the core tells apart."""
+    """Return the bits of a converter over its whole range: no more than a number of the core distinguishes."""
     return whole(place, value, least=1, most=52)
 
 
@@ -148,7 +148,7 @@ def samples(place: str, value: object, unit: str = "", *, shape: Sequence[int | 
         raise _uneven(place, value) or BadInput(place, value, allowed) from None
     if raw.dtype.kind not in "iuf":
         raise BadInput(place, Text(_KINDS.get(raw.dtype.kind, str(raw.dtype))) if raw.ndim else value, allowed)
-    if 0 in raw.strides:  # numbers that are held once and seen many times; whoever works with them copies them
+    if 0 in raw.strides:  # numbers that are held once and shared by views; users copy them
         from ._armrs import require_room
 
         require_room(8 * raw.size)
@@ -194,7 +194,7 @@ def instances(place: str, value: object, kind: type[_Kind]) -> tuple[_Kind, ...]
         raise BadInput(place, value, allowed)
     try:
         items = tuple(value)
-    except TypeError:  # an array without a dimension says that it can be iterated
+    except TypeError:  # an array without a dimension has `__iter__`
         raise BadInput(place, value, allowed) from None
     for k, item in enumerate(items):
         instance(f"{place}[{k}]", item, kind)
@@ -218,7 +218,7 @@ def function(place: str, value: object) -> None:
 
 
 def progress(given: Callable[[str, float], None] | None) -> Callable[[str, float], None]:
-    """Return what is told of stages and shares; nobody where nothing is given."""
+    """Return the receiver of stages and shares; one without effect where nothing is given."""
     if given is None:
         return lambda stage, share: None
     function("progress", given)

@@ -81,7 +81,7 @@ def own_effect(
     Raises
     ------
     BadInput
-        For parameters out of order, a law that is not linear where it says so, and one that is too rough for the table.
+        For parameters out of order, a law that is not linear where it is declared so, and one that is too rough for the table.
 
     Notes
     -----

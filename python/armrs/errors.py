@@ -17,14 +17,14 @@ class ArmrsError(Exception):
     Attributes
     ----------
     trial : int, optional
-        Index of the trial it is about, where the core says so; `armrs.io.dataset.naming_trials` turns it into the name of a file.
+        Index of the trial it is about, where the core states it; `armrs.io.dataset.naming_trials` turns it into the name of a file.
     """
 
     trial: int | None = None
 
 
 class ArmrsWarning(UserWarning):
-    """What a reader of a result should know. Results hold these lines in `warnings`, too; the command line prints them."""
+    """A remark on a result or its data. Results hold these lines in `warnings`, too; the command line prints them."""
 
 
 class BadInput(ArmrsError, ValueError):
@@ -94,7 +94,7 @@ class BadInputs(BadInput):
 
     @classmethod
     def of(cls, problems: Iterable[BadInput], told_by: str = "armrs check lists") -> BadInput:
-        """Return one refusal for all problems, or the problem itself where there is but one; `told_by` says where the others stand."""
+        """Return one refusal for all problems, or the problem itself where there is but one; `told_by` is where the others stand."""
         listed = tuple(problems)
         if len(listed) == 1:
             return listed[0]
@@ -107,7 +107,7 @@ class BadInputs(BadInput):
 
 
 class IdentificationError(ArmrsError):
-    """The data cannot answer what the identification asks."""
+    """The data do not determine what is to be identified."""
 
 
 class SimulationError(ArmrsError):
@@ -124,7 +124,7 @@ class SlaveError(ArmrsError):
     status : int
         `armrs.cosim.Status`: discard (2), error (3) or fatal (4).
     message : str
-        What the slave says.
+        Message of the slave.
     """
 
     def __init__(self, function: str, status: int, message: str) -> None:
@@ -155,7 +155,7 @@ class Text(str):
 
 
 def not_utf8(place: str, raw: bytes, error: UnicodeDecodeError, *, file: str | os.PathLike[str] | None = None) -> BadInput:
-    """Build the refusal of bytes that are no UTF-8 text; it says what they probably are."""
+    """Build the refusal of bytes that are no UTF-8 text; it states what they probably are."""
     utf16 = raw[:2] in (b"\xff\xfe", b"\xfe\xff")
     guess = "UTF-16" if utf16 else "Latin-1 or Windows-1252"
     return BadInput(place, Text(f"byte 0x{raw[error.start]:02x}"), "UTF-8 text", file=file, hint=f"{guess} text? Save it as UTF-8")
@@ -190,7 +190,7 @@ def one_line(text: object) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that looks most like `name`, or None when none is like it."""
+    """Return the known name that is most similar to `name`, or None when none is similar."""
     known = sorted(known)
     lower = {k.lower(): k for k in reversed(known)}
     match = difflib.get_close_matches(str(name).lower(), lower, n=1, cutoff=_ALIKE)
@@ -198,7 +198,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def unknown_name(place: str, name: str, known: Iterable[str], *, what: str = "key") -> BadInput:
-    """Build the refusal of a name that is not known; it says the nearest known one."""
+    """Build the refusal of an unknown name; it states the nearest known one."""
     known = sorted(known)
     near = nearest(name, known)
     return BadInput(

@@ -35,7 +35,7 @@ def call_with_progress(function: Callable[..., _Result], *given: Any, progress: 
 
 
 def is_working() -> bool:
-    """Tell whether work goes on that nothing waits for any more."""
+    """Return whether work goes on that nothing waits for any more."""
     return any(thread.name == _NAME for thread in threading.enumerate())
 
 
@@ -62,7 +62,7 @@ def _waited(function: Callable[[_Progress], _Result], progress: _Progress = lamb
         # A loop of its own: an interrupt in a jump of one passes the handlers around it by.
         done, value = _attended(events, answers, progress)
     except BaseException:
-        answers.put(KeyboardInterrupt())  # to what goes on and tells of it
+        answers.put(KeyboardInterrupt())  # to the thread that goes on and reports progress
         raise
     thread.join()
     if not done:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _SHOWN = 30
 """Rows that a notebook shows; `to_dataframe` has all."""
 _SMALLEST = 1e-12
-"""Probabilities below are not told apart."""
+"""Probabilities below are not distinguished."""
 SYMBOLS = (
     "m is the mass of a segment, l the distance of its centre of mass from the joint, I its inertia about the centre of mass and a its "
     "length; the number is that of the segment, counted from the base. The elastic law of a joint is stiffness times its angle from rest; "
@@ -52,7 +52,7 @@ class Tidy:
 
 
 class Framed:
-    """What is also a table: a data frame, and rows in a notebook. Subclasses say which by `tidy`."""
+    """What is also a table: a data frame, and rows in a notebook. Subclasses define it by `tidy`."""
 
     symbols: ClassVar[str] = ""
     """What the symbols in the names mean, for readers of the table."""

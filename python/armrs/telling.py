@@ -33,7 +33,7 @@ def telling(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
 
 
 def _lines(result: object, given: Iterable[object]) -> list[str]:
-    """Return the warnings of a result; a data set that was given has told its own when it was read."""
+    """Return the warnings of a result; those of a given data set were shown when it was read."""
     own = list(getattr(result, "warnings", ()))
     dataset = getattr(result, "dataset", None)
     if dataset is None or any(value is dataset for value in given):

@@ -1,6 +1,6 @@
 """The one door from a result to what draws it: named here, loaded when something is drawn.
 
-Modules that compute import nothing that draws, and starting costs nothing for pictures that nobody asks for.
+Modules that compute import nothing that draws, and starting takes no time for figures that are not needed.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def of(drawn: object) -> Any:
 
 
 def words_of(verb: str) -> Any:
-    """Return the module with sentences and tables about the results of a verb. Its function `verdict` says one in a sentence or two."""
+    """Return the module with sentences and tables about the results of a verb. Its function `verdict` summarises one."""
     return _load(WORDS.get(verb, "report.words"))
 
 

@@ -102,7 +102,7 @@ def read(trial: Trial, who: Subject, own: Sensors, hidden: list[Hidden], random:
 def draw(
     family: str, strength: str | None, number: int, who: Subject, made: list[Trial], random: Random
 ) -> tuple[list[Hidden], str | None]:
-    """Draw what is hidden, and say how strong it is. Numbers that follow each other go round all kinds."""
+    """Draw what is hidden, and how strong it is. Numbers that follow each other go round all kinds."""
     fitted = [(k, t) for k, t in enumerate(made) if not t.test and t.slip is None]
     kinds = list(SIZES)
     if family == "single":
@@ -252,7 +252,7 @@ def model(who: Subject) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Make sessions; a seed of which none can be made is said and left out."""
+    """Make sessions; a seed of which none can be made is reported and left out."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--family", required=True, choices=["null", "single", "double", "outside", "little_known"])
     parser.add_argument("--strength", choices=["strong", "medium"])

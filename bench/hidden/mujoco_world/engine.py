@@ -1,4 +1,4 @@
-"""An arm led by a robot, as MuJoCo sees it: MJCF, and one trial.
+"""An arm led by a robot in MuJoCo: MJCF, and one trial.
 
 MuJoCo (Todorov, Erez, Tassa, IROS 2012, https://mujoco.org) computes everything that moves: generalised coordinates with soft constraints,
 `stiffness` and `springref`, `damping`, `frictionloss`, `armature`, fixed tendons over two joints, actuators that are
@@ -89,7 +89,7 @@ Torque = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass
 class Grip:
-    """How the handle is held in a trial [m]: beside the hand's end, beside where the robot says; start [s], way of a slip."""
+    """How the handle is held in a trial [m]: beside the hand's end, beside the place by the robot's angles; start [s], way of a slip."""
 
     in_hand: tuple[float, float] = (0.0, 0.0)
     in_room: tuple[float, float] = (0.0, 0.0)

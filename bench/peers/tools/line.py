@@ -15,7 +15,7 @@ def seconds_of(call: Callable[[], Any], least: float = 0.1, warm: bool = True) -
     """Repeat a call for about `least` seconds and return the processor time of one, after one that does not count."""
     if warm:
         call()
-    # A look at the clock costs as much as some calls: one for many of them where they are short.
+    # Reading the clock costs as much as some calls: once for many of them where they are short.
     calls, between, start = 0, 1, time.process_time()
     while True:
         for _ in range(between):

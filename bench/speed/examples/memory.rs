@@ -33,7 +33,7 @@ fn main() {
     }
 }
 
-/// Largest memory of this process so far \[MB\], where the system tells.
+/// Largest memory of this process so far \[MB\], where the system states it.
 fn peak() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));

@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-/// Masses that the cascade believes, relative to the truth, and how well: as in `problem.py`.
+/// Prior means of the masses in the cascade, relative to the truth, and their standard deviation: as in `problem.py`.
 const MASS_ERROR: [f64; 3] = [1.08, 0.92, 1.08];
 const KNOWN_WITHIN: f64 = 0.3;
 /// The accuracy of a batch is that of every fiftieth run.
@@ -64,7 +64,7 @@ fn repeated<R, C>(mut call: impl FnMut() -> R, now: fn() -> C, since: fn(&C) -> 
     }
     black_box(call());
     let start = now();
-    // A look at the clock costs as much as some kernels: one for many calls where they are short.
+    // Reading the clock costs as much as some kernels: once for many calls where they are short.
     let (mut calls, mut between) = (0, 1);
     loop {
         for _ in 0..between {

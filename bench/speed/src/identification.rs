@@ -85,7 +85,7 @@ fn effects(values: [[f64; 3]; 2]) -> Vec<Effect<f64>> {
         .collect()
 }
 
-/// What the joint method is asked: 15 unknowns and three offsets of angles.
+/// The problem of the joint method: 15 unknowns and three offsets of angles.
 pub fn joint(n: usize) -> (Model<3>, [Trial<3>; 1], Options) {
     let trial = fast(n, &effects([[0.2; 3], [0.1, 0.08, 0.03]]));
     let options = Options {

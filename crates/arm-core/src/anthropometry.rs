@@ -1,10 +1,9 @@
-//! Literature values of the segments of the arm, as first guesses and as priors.
+//! Literature values of the segments of the arm, as initial values and as priors.
 //!
 //! * de Leva, P. (1996), Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters, J. Biomech. 29, table 4:
 //!   means of 100 young men (73.0 kg, 1.741 m) and 15 young women (61.9 kg, 1.735 m), between joint centres.
-//! * Zatsiorsky, Seluyanov (1983, 1985): regressions on body mass and height of the same men, with residual standard
-//!   deviations.
-//! * Kodek (2004), table 2.1: relative masses by earlier authors.
+//! * Zatsiorsky, Seluyanov (1983, 1985): regressions of moments of inertia on body mass and height of the same men, and
+//!   standard deviations of masses, centres of mass and moments.
 //!
 //! ```
 //! use arm_core::anthropometry::{Grip, Part, Sex, Subject};
@@ -51,7 +50,7 @@ pub enum Axis {
     Longitudinal,
 }
 
-/// How the hand is turned against the plane of motion, which decides about its radius of gyration.
+/// How the hand is turned against the plane of motion, which determines its radius of gyration.
 ///
 /// Upper arm and forearm turn about their transverse axis in either case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,24 +63,24 @@ pub enum Grip {
 
 /// A value and its standard deviation among people.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct Expected {
     /// Expected value.
     pub value: f64,
     /// Standard deviation.
     pub sd: f64,
 }
 
-/// What the literature expects of a segment.
+/// Prior of a segment from the literature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SegmentPrior {
     /// Length, measured or scaled \[m\].
     pub length: f64,
     /// Mass \[kg\].
-    pub mass: Estimate,
+    pub mass: Expected,
     /// Centre of mass from the proximal joint \[m\].
-    pub com: Estimate,
+    pub com: Expected,
     /// Moment of inertia about the centre of mass \[kg m²\].
-    pub inertia: Estimate,
+    pub inertia: Expected,
 }
 
 impl SegmentPrior {
@@ -96,60 +95,13 @@ impl SegmentPrior {
     }
 }
 
-/// Who measured relative masses (table 2.1 of the thesis, and de Leva's adjustment).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Author {
-    /// Harless 1860, cadavers.
-    Harless,
-    /// Braune and Fischer 1889, cadavers.
-    BrauneFischer,
-    /// Dempster 1955, cadavers.
-    Dempster,
-    /// Clauser and others 1969, cadavers.
-    Clauser,
-    /// Bernstein and others 1931, living people.
-    Bernstein,
-    /// Zatsiorsky and Seluyanov 1983, living men.
-    Zatsiorsky,
-    /// de Leva 1996, the only one with values for women.
-    DeLeva,
-}
-
-/// All authors, oldest first.
-pub const AUTHORS: [Author; 7] = [
-    Author::Harless,
-    Author::BrauneFischer,
-    Author::Dempster,
-    Author::Clauser,
-    Author::Bernstein,
-    Author::Zatsiorsky,
-    Author::DeLeva,
-];
-
-impl Author {
-    /// Mass of a segment as a percentage of body mass. Only de Leva distinguishes women; the others give what they gave.
-    pub const fn percentage(self, part: Part, sex: Sex) -> f64 {
-        let row = match self {
-            Self::Harless => [3.2, 1.7, 0.9],
-            Self::BrauneFischer => [3.3, 2.1, 0.8],
-            Self::Dempster => [2.7, 1.6, 0.6],
-            Self::Clauser => [2.6, 1.6, 0.7],
-            Self::Bernstein => [2.65, 1.82, 0.7],
-            Self::Zatsiorsky => [2.70, 1.63, 0.61],
-            Self::DeLeva => match sex {
-                Sex::Male => [2.71, 1.62, 0.61],
-                Sex::Female => [2.55, 1.38, 0.56],
-            },
-        };
-        row[part as usize]
-    }
-}
-
 /// Mean and standard deviation of the relative mass in Zatsiorsky's men \[%\] (table 2.1 of the thesis).
 const RELATIVE_MASS: [[f64; 2]; 3] = [[2.70, 0.24], [1.63, 0.14], [0.61, 0.08]];
 
 /// A row of de Leva's table 4.
 struct Shape {
+    /// Mass \[% of body mass\].
+    mass: f64,
     /// Mean length in the sample \[m\].
     length: f64,
     /// Centre of mass from the proximal joint, of the length.
@@ -159,15 +111,20 @@ struct Shape {
 }
 
 const fn shape(part: Part, sex: Sex) -> Shape {
-    let (length, com, radii) = match (part, sex) {
-        (Part::UpperArm, Sex::Male) => (0.2817, 0.5772, [0.285, 0.269, 0.158]),
-        (Part::Forearm, Sex::Male) => (0.2689, 0.4574, [0.276, 0.265, 0.121]),
-        (Part::Hand, Sex::Male) => (0.0862, 0.7900, [0.628, 0.513, 0.401]),
-        (Part::UpperArm, Sex::Female) => (0.2751, 0.5754, [0.278, 0.260, 0.148]),
-        (Part::Forearm, Sex::Female) => (0.2643, 0.4559, [0.261, 0.257, 0.094]),
-        (Part::Hand, Sex::Female) => (0.0780, 0.7474, [0.531, 0.454, 0.335]),
+    let (mass, length, com, radii) = match (part, sex) {
+        (Part::UpperArm, Sex::Male) => (2.71, 0.2817, 0.5772, [0.285, 0.269, 0.158]),
+        (Part::Forearm, Sex::Male) => (1.62, 0.2689, 0.4574, [0.276, 0.265, 0.121]),
+        (Part::Hand, Sex::Male) => (0.61, 0.0862, 0.7900, [0.628, 0.513, 0.401]),
+        (Part::UpperArm, Sex::Female) => (2.55, 0.2751, 0.5754, [0.278, 0.260, 0.148]),
+        (Part::Forearm, Sex::Female) => (1.38, 0.2643, 0.4559, [0.261, 0.257, 0.094]),
+        (Part::Hand, Sex::Female) => (0.56, 0.0780, 0.7474, [0.531, 0.454, 0.335]),
     };
-    Shape { length, com, radii }
+    Shape {
+        mass,
+        length,
+        com,
+        radii,
+    }
 }
 
 /// Mean height of the sample of de Leva's table \[m\].
@@ -182,20 +139,15 @@ const fn sample_height(sex: Sex) -> f64 {
 struct Line([f64; 4]);
 
 impl Line {
-    fn at(&self, subject: &Subject, unit: f64) -> Estimate {
+    fn at(&self, subject: &Subject, unit: f64) -> Expected {
         let [b0, b1, b2, sd] = self.0;
-        Estimate {
+        Expected {
             value: unit * (b0 + b1 * subject.body_mass + b2 * 100.0 * subject.height),
             sd: unit * sd,
         }
     }
 }
 
-const MASS: [Line; 3] = [
-    Line([0.250, 0.03012, -0.0027, 0.178]),
-    Line([0.3185, 0.01445, -0.00114, 0.101]),
-    Line([-0.1165, 0.0036, 0.00175, 0.063]),
-];
 /// Moments of inertia \[kg cm²\] about the sagittal, transverse and longitudinal axis.
 const INERTIA: [[Line; 3]; 3] = [
     [
@@ -218,7 +170,7 @@ const INERTIA: [[Line; 3]; 3] = [
 /// landmarks, and so hold for de Leva's joint centres in size only.
 const COM_SD: [f64; 3] = [0.0140, 0.0114, 0.0110];
 
-/// A person, as the tables need one.
+/// A person, described by the inputs of the tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Subject {
     body_mass: f64,
@@ -230,7 +182,7 @@ impl Subject {
     /// A person from body mass \[kg\] and height \[m\].
     ///
     /// # Errors
-    /// [`Invalid`] outside 20 to 300 kg and 1.0 to 2.5 m, where the tables would say nothing (and a height in cm stands out).
+    /// [`Invalid`] outside 20 to 300 kg and 1.0 to 2.5 m, where the tables do not apply (this also refuses a height in cm).
     pub fn new(body_mass: f64, height: f64, sex: Sex) -> Result<Self, Invalid> {
         within("body mass", body_mass, 20.0, 300.0)?;
         within("height", height, 1.0, 2.5)?;
@@ -241,21 +193,20 @@ impl Subject {
         })
     }
 
-    /// Mass of a segment by an author's percentage \[kg\].
+    /// Mass of a segment by de Leva's percentage \[kg\].
     ///
-    /// The standard deviation is that of Zatsiorsky's men relative to their mean, for every author and sex: the others
-    /// state none.
-    pub fn mass(&self, author: Author, part: Part) -> Estimate {
-        let value = self.body_mass * author.percentage(part, self.sex) / 100.0;
+    /// The standard deviation is that of Zatsiorsky's men relative to their mean, for both sexes: de Leva states none.
+    pub fn mass(&self, part: Part) -> Expected {
+        let value = self.body_mass * shape(part, self.sex).mass / 100.0;
         let [mean, sd] = RELATIVE_MASS[part as usize];
-        Estimate {
+        Expected {
             value,
             sd: value * sd / mean,
         }
     }
 
-    /// Length of a segment by scaling de Leva's mean with height \[m\]: geometric similarity, a guess for want of a
-    /// measurement.
+    /// Length of a segment by scaling de Leva's mean with height \[m\]: geometric similarity, used where no
+    /// length was measured.
     pub fn mean_length(&self, part: Part) -> f64 {
         shape(part, self.sex).length * self.height / sample_height(self.sex)
     }
@@ -263,10 +214,10 @@ impl Subject {
     /// Moment of inertia about an axis through the centre of mass by de Leva's radii of gyration \[kg m²\].
     pub fn inertia(&self, part: Part, length: f64, axis: Axis) -> f64 {
         let radius = length * shape(part, self.sex).radii[axis as usize];
-        self.mass(Author::DeLeva, part).value * radius * radius
+        self.mass(part).value * radius * radius
     }
 
-    /// What to expect of a segment by de Leva's table.
+    /// Prior of a segment by de Leva's table.
     ///
     /// * `length` - as measured \[m\]; by default [`Subject::mean_length`]
     ///
@@ -296,28 +247,23 @@ impl Subject {
         let inertia = self.inertia(part, length, axis);
         Ok(SegmentPrior {
             length,
-            mass: self.mass(Author::DeLeva, part),
-            com: Estimate {
+            mass: self.mass(part),
+            com: Expected {
                 value: length * shape(part, self.sex).com,
                 sd: COM_SD[part as usize],
             },
-            inertia: Estimate {
+            inertia: Expected {
                 value: inertia,
                 sd: inertia * typical.sd / typical.value,
             },
         })
     }
 
-    /// Mass of a segment by Zatsiorsky's regression \[kg\]; none for women, of whom these are not.
-    pub fn regressed_mass(&self, part: Part) -> Option<Estimate> {
-        (self.sex == Sex::Male).then(|| MASS[part as usize].at(self, 1.0))
-    }
-
     /// Moment of inertia about an axis through the centre of mass by Zatsiorsky's regression \[kg m²\]; none for women.
     ///
     /// Segments of the regressions end at bony landmarks and not at joint centres, so that they differ somewhat from de
     /// Leva's. For small people they can become negative.
-    pub fn regressed_inertia(&self, part: Part, axis: Axis) -> Option<Estimate> {
+    pub fn regressed_inertia(&self, part: Part, axis: Axis) -> Option<Expected> {
         (self.sex == Sex::Male).then(|| INERTIA[part as usize][axis as usize].at(self, 1e-4))
     }
 }

@@ -73,7 +73,7 @@ impl<T: Scalar, const N: usize> Chain<T, N> {
         Ok(Self { rotor, ..self })
     }
 
-    /// The same arm under another acceleration of gravity \[m/s²\]: on a base that accelerates by a, what it feels is g − a.
+    /// The same arm under another acceleration of gravity \[m/s²\]: on a base that accelerates by a, it is g − a.
     pub fn with_gravity(self, gravity: Plane<T>) -> Self {
         Self { gravity, ..self }
     }

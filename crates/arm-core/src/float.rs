@@ -7,7 +7,7 @@ use crate::series::{
     turned_single,
 };
 
-/// Square roots of the processor where it has them: the compiler knows these two names, and takes its instruction or the
+/// Square roots of the processor where it has them: the compiler recognises these two names, and takes the instruction or the
 /// function of its own support. Either is exact by IEEE 754.
 #[cfg(target_os = "none")]
 #[expect(

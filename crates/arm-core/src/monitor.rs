@@ -91,7 +91,7 @@ impl<T: Real> Channel<T> {
     }
 }
 
-/// What a monitor sees of one control period. Times count from any start, in microseconds.
+/// Input of a monitor in one control period. Times count from any start, in microseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation<T, const C: usize> {
     /// The controller's clock \[µs\].
@@ -254,7 +254,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         })
     }
 
-    /// Looks at one control period.
+    /// Checks one control period.
     ///
     /// # Errors
     /// The first [`Stop`], in every period from then on.
@@ -298,11 +298,6 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     pub fn reset(&mut self) {
         self.last = None;
         self.stop = None;
-    }
-
-    /// The channels and their limits.
-    pub fn channels(&self) -> &[Channel<T>; C] {
-        &self.channels
     }
 
     fn fault(
@@ -364,7 +359,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
         })
     }
 
-    /// Remembers the observation and finds the first channel that is not as allowed. Repeats of one sample count as one.
+    /// Stores the observation and finds the first channel that is not as allowed. Repeats of one sample count as one.
     fn value_fault(
         &mut self,
         [now, stamp]: [u64; 2],

@@ -71,10 +71,6 @@ impl<T: Scalar> Robot<T> {
     pub fn base(&self) -> Plane<T> {
         self.base
     }
-    /// The side of the elbow that [`Robot::angles`] chooses.
-    pub fn elbow(&self) -> Elbow {
-        self.elbow
-    }
     /// Shortest and longest distance of the handle from the base \[m\].
     pub fn reach(&self) -> [T; 2] {
         let [a, b] = self.lengths;

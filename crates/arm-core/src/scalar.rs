@@ -28,7 +28,7 @@ pub trait Scalar:
     fn of(value: f64) -> Self;
     /// `then` where `a < b`, else `otherwise`.
     fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self;
-    /// [`Scalar::if_less`] between what takes long to compute: of one number only what is asked for.
+    /// [`Scalar::if_less`] between values that take long to compute: for a single number only the selected one is computed.
     #[inline(always)]
     fn where_less(
         a: Self,
@@ -97,7 +97,7 @@ pub trait Scalar:
     }
 }
 
-/// One real number, of which a device may ask which of two is larger: `f64` or `f32`, but not lanes.
+/// One real number that can be compared: `f64` or `f32`, but not lanes.
 pub trait Real: Scalar + PartialOrd {
     /// The same number in double precision.
     fn to_f64(self) -> f64;

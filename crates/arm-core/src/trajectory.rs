@@ -154,10 +154,6 @@ impl<T: Scalar> Profile<T> {
     pub fn distance(&self) -> T {
         self.distance
     }
-    /// Highest speed, with the sign of the distance.
-    pub fn peak_speed(&self) -> T {
-        self.distance * self.peak
-    }
 
     /// The motion at a time \[s\]; at rest before zero and after the end.
     #[inline]

@@ -1,4 +1,4 @@
-//! What each unknown of a description depends on, so that an importer sees which inputs go through at once.
+//! What each unknown of a description depends on, from which an importer reads direct feedthrough.
 
 use arm_sim::Port;
 

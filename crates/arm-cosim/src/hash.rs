@@ -1,4 +1,4 @@
-//! A number that stands for bytes.
+//! A hash of bytes.
 
 /// FNV-1a, 64 bits (Fowler, Noll, Vo).
 pub fn fnv1a(bytes: &[u8]) -> u64 {

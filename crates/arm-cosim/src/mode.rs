@@ -6,7 +6,7 @@
 pub enum Mode {
     /// Made, or reset.
     Instantiated = 0,
-    /// Start values are set, outputs can be looked at.
+    /// Start values are set, outputs can be read.
     Initialization = 1,
     /// Between communication steps.
     Step = 2,

@@ -15,7 +15,7 @@ pub(crate) trait Plant: Send + Sync {
     fn set_input(&mut self, quantity: Quantity, value: f64);
     /// Sets a continuous state.
     fn set_state(&mut self, quantity: Quantity, value: f64);
-    /// Sets the time \[s\]; the handle is where its input says.
+    /// Sets the time \[s\]; the handle is at its input.
     fn set_time(&mut self, time: f64);
     /// Advances, and carries the handle along.
     fn advance(&mut self, duration: f64) -> Result<(), SimulationError>;

@@ -1,6 +1,6 @@
-//! What a variable stands for in the arm.
+//! The quantity of a variable.
 
-/// What a variable stands for in the arm; joints, segments and axes count from zero.
+/// The quantity of a variable; joints, segments and axes count from zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Time.

@@ -373,7 +373,7 @@ impl Slave {
         self.only_in("make a step", &[Mode::Step])?;
         let own = self.plant.time();
         let within = |share: f64, a: f64, b: f64| (a - b).abs() <= share * b.abs().max(1.0);
-        // A step that is whole inner steps but for less than 1e-6 of one is not yet brought back, see `Stepper::advance`.
+        // A step within 1e-6 of a whole number of inner steps is not yet rounded to it, see `Stepper::advance`.
         let lag = 2e-6 * self.spec.step;
         // Far from zero a share of the time may be more than a step: then a part of the step decides.
         let near = |a: f64, b: f64| {

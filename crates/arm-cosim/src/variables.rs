@@ -75,7 +75,7 @@ pub enum Initial {
 pub struct Variable {
     /// Structured name, one-based: `q[1]`, `body[2].m`.
     pub name: String,
-    /// What it stands for.
+    /// Its quantity.
     pub quantity: Quantity,
     /// What it is for.
     pub causality: Causality,
@@ -517,7 +517,7 @@ pub(crate) fn fits(variable: &Variable, value: f64) -> bool {
     value.is_finite() && value >= min && value <= max
 }
 
-/// Writes a value into the place of an arm that a settable variable stands for.
+/// Writes the value of a settable variable into an arm.
 pub(crate) fn put(spec: &mut ArmSpec, quantity: Quantity, value: f64) {
     match quantity {
         Quantity::Angle(j) => spec.start.q[j] = value,

@@ -209,7 +209,7 @@ pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     }
 }
 
-/// Tells up to when the last step went.
+/// Returns the end time of the last step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2GetRealStatus(
     instance: Handle,
@@ -228,7 +228,7 @@ pub unsafe extern "C" fn fmi2GetRealStatus(
     }
 }
 
-/// Tells whether the slave wants to end: it never does.
+/// Returns whether the slave requests to end: it never does.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2GetBooleanStatus(
     instance: Handle,

@@ -261,7 +261,7 @@ pub unsafe extern "C" fn fmi3UpdateDiscreteStates(
     }
 }
 
-/// Tells how many event indicators there are: none.
+/// Returns the number of event indicators: none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3GetNumberOfEventIndicators(
     instance: Handle,
@@ -276,7 +276,7 @@ pub unsafe extern "C" fn fmi3GetNumberOfEventIndicators(
     }
 }
 
-/// Tells how many continuous states there are.
+/// Returns the number of continuous states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3GetNumberOfContinuousStates(
     instance: Handle,

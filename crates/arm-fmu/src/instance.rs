@@ -35,7 +35,7 @@ pub enum Log {
 }
 
 impl Log {
-    /// Tells the importer.
+    /// Reports to the importer.
     pub fn tell(&self, status: Status, category: &str, text: &str) {
         let (category, text) = (zero_ended(category), zero_ended(text));
         match self {
@@ -270,7 +270,7 @@ pub unsafe fn free_state(handle: Handle, what: &str, place: *mut *mut c_void) ->
     unsafe { guarded(handle, what, body) }
 }
 
-/// Tells how many bytes a state takes.
+/// Returns the number of bytes of a state.
 ///
 /// # Safety
 /// As [`get_state`].

@@ -18,7 +18,7 @@ pub use instance::{Handle, guarded};
 
 const MARK: &str = concat!("armrs library for FMUs ", env!("CARGO_PKG_VERSION"), "\0");
 
-/// Names the library and its version in the file, for whoever packs libraries of several machines into one FMU.
+/// Names the library and its version in the file, for tools that pack libraries of several machines into one FMU.
 #[unsafe(no_mangle)]
 pub static ARMRS_LIBRARY: [u8; MARK.len()] = {
     let mut bytes = [0; MARK.len()];

@@ -1,4 +1,4 @@
-//! What comes from C. The importer promises what the standards say: pointers are null or valid for the number of elements
+//! Arguments from C. The importer guarantees what the standards require: pointers are null or valid for the number of elements
 //! given with them, strings end with a zero byte, and an instance is used by one thread at a time and not after it was freed.
 
 use std::alloc::Layout;
@@ -53,7 +53,7 @@ pub unsafe fn write<'a, T>(start: *mut T, n: usize) -> Result<&'a mut [T], Refus
     Ok(unsafe { std::slice::from_raw_parts_mut(start, n) })
 }
 
-/// Writes one value where the importer wants to have it; nowhere when it gives no place.
+/// Writes one value to the pointer of the importer; nothing if that is null.
 ///
 /// # Safety
 /// See the module.

@@ -1,6 +1,6 @@
-//! Functions that the standards want in every library and that have no meaning here.
+//! Functions that the standards require in every library and that have no meaning here.
 
-/// Functions that the standard wants in every library, refused here.
+/// Functions that the standard requires in every library, refused here.
 macro_rules! refused {
     ($($name:ident($($argument:ty),*);)*) => {$(
         #[doc = "Refused: not supported by this FMU."]

@@ -72,7 +72,7 @@ pub fn path_of_uri(uri: &str) -> Result<PathBuf, Refused> {
                 .ok()
                 .and_then(|h| u8::from_str_radix(h, 16).ok())
         };
-        // A percent sign that begins no code stands for itself: there are importers that forget to encode it.
+        // A percent sign that begins no code stands for itself: some importers do not encode it.
         match (first, code()) {
             (b'%', Some(byte)) => {
                 bytes.push(byte);

@@ -89,7 +89,7 @@ macro_rules! shared {
             unsafe { instance::free_state(instance, stringify!($free_state), state) }
         }
 
-        /// Tells how many bytes a state takes.
+        /// Returns the number of bytes of a state.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $state_size(
             instance: Handle,

@@ -6,14 +6,14 @@ use arm_sim::SimulationError;
 /// What stops the gap workflow. Candidates that cannot be simulated do not: they are left out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GapError {
-    /// A data set that cannot be judged.
+    /// Insufficient data.
     #[error("{what}: {found} found, {allowed} needed")]
     Data {
         /// What of it.
         what: &'static str,
         /// What was found.
         found: String,
-        /// What would do.
+        /// What is allowed.
         allowed: &'static str,
     },
     /// The model as given cannot be simulated on a trial.
@@ -30,10 +30,10 @@ pub enum GapError {
     /// The normal equations of a fit are not positive definite: a parameter that nothing decides.
     #[error("the fit of {unknowns} unknowns is singular")]
     Singular {
-        /// How many were asked.
+        /// Number of unknowns.
         unknowns: usize,
     },
-    /// Who is told of the work wants no more of it.
+    /// The receiver of progress reports ended the work.
     #[error("stopped")]
     Stopped,
 }

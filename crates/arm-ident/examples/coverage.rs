@@ -189,7 +189,7 @@ fn print_row(name: &str, truth: f64, found: &[Found]) {
     );
 }
 
-/// One trial as the sensors see it.
+/// One trial as measured by the sensors.
 fn measured(run: &Recording<2>, session: &Session, random: &mut ChaCha8Rng) -> Trial<2> {
     let n = run.time.len();
     let mut trial = Trial {

@@ -20,7 +20,7 @@ pub enum IdentError {
     NoPlan {
         /// Movements tried.
         evaluations: usize,
-        /// What the movement that comes nearest still exceeds when it is slowed as far as may be.
+        /// The limits that the best movement exceeds at the slowest pace.
         nearest: crate::experiment_design::limit::Excess,
     },
     /// The simulated arm moves elsewhere than the measured one.
@@ -58,7 +58,7 @@ pub enum IdentError {
 }
 
 impl IdentError {
-    /// Says in which trial it happened, counted from zero.
+    /// Adds the trial in which it happened, counted from zero.
     pub(crate) fn in_trial(self, index: usize) -> Self {
         Self::InTrial {
             number: index + 1,

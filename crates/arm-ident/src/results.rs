@@ -1,4 +1,4 @@
-//! What an identification came to, in the terms of files and reports: one type for Rust, Python and JSON.
+//! The result of an identification, in the terms of files and reports: one type for Rust, Python and JSON.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::regression::trial::Role;
 pub struct Fit {
     /// Position of each sample that was used in the trial.
     pub samples: Vec<usize>,
-    /// Joint torques that the measurement asks for, a row a sample \[N m\].
+    /// Joint torques that follow from the measurement, a row a sample \[N m\].
     pub measured: Vec<Vec<f64>>,
     /// Joint torques of the fitted model \[N m\].
     pub fitted: Vec<Vec<f64>>,
@@ -39,7 +39,7 @@ impl<const N: usize> From<&estimate::Explained<N>> for Fit {
 /// Values by name, in their order.
 pub type Named<T> = indexmap::IndexMap<String, T>;
 
-/// What of a trial a result names.
+/// Role and configuration of a trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialName {
     /// Whether it is a fit trial or a test trial.
@@ -48,9 +48,9 @@ pub struct TrialName {
     pub configuration: String,
 }
 
-/// The question to an identification, in the terms of the files.
+/// The input of an identification, in the terms of the files.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct IdentificationInput<'a> {
     /// The model as given.
     pub model: &'a Model,
     /// Every effect that was taken into account.
@@ -63,7 +63,7 @@ pub struct Asked<'a> {
     pub level: f64,
 }
 
-/// What an identification came to.
+/// The result of an identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identification {
     /// `joint` or `cascade`.
@@ -76,7 +76,7 @@ pub struct Identification {
     pub unknowns: usize,
     /// The unknowns and what follows from them.
     pub parameters: Vec<Estimate>,
-    /// The base parameters: what a planar chain can show at all.
+    /// The base parameters: what any movement of a planar chain can determine at most.
     pub combinations: Vec<Estimate>,
     /// Small imperfections of the measurement that were refitted within the declared tolerance.
     pub calibration: Vec<Estimate>,
@@ -84,13 +84,13 @@ pub struct Identification {
     pub correlated: Vec<String>,
     /// Correlations of their errors, by rows.
     pub correlations: Vec<Vec<f64>>,
-    /// What in the result cannot be true of this arm and these sensors, in words.
+    /// Values of the result that are impossible for this arm and these sensors, in words.
     pub contradictions: Vec<String>,
     /// What the fitted model does not describe well, in words.
     pub misfits: Vec<String>,
     /// What of the model the method does not take into account, in words.
     pub left_out: Vec<String>,
-    /// Which unknowns the movements cannot tell apart, in words.
+    /// Which unknowns the movements cannot distinguish, in words.
     pub trades: Vec<String>,
     /// Whether all parameters are known up to one common factor only: no torque acted.
     pub scale_free: bool,
@@ -123,7 +123,7 @@ impl Identification {
     /// [`Refused`] where an estimate is none that a model may have.
     pub fn of<const N: usize>(
         result: &estimate::Identified<N>,
-        asked: &Asked<'_>,
+        asked: &IdentificationInput<'_>,
     ) -> Result<Self, Refused> {
         let not_simulated = result.not_simulated.as_ref();
         let trials: Vec<_> = result.explained.iter().zip(asked.trials).collect();
@@ -221,11 +221,11 @@ const ROUNDING: f64 = 1e-12;
 fn identified_model<const N: usize>(
     chain: &Chain<f64, N>,
     fitted: &[CoreEffect<f64>],
-    asked: &Asked<'_>,
+    asked: &IdentificationInput<'_>,
 ) -> Result<Model, Refused> {
     let model = asked.model;
     let fitted: Vec<Effect> = fitted.iter().map(Effect::from_core).collect();
-    // What effects of segments and of the hand did to the segments is in them now.
+    // Effects of segments and of the hand are contained in the segments now.
     let held = asked.effects.iter().filter(|e| {
         let place = e.kind.info().place;
         !matches!(place, Place::Joint | Place::Segment | Place::Hand)

@@ -152,7 +152,7 @@ impl Muscle {
     }
 }
 
-/// What `dataset.toml` says of one trial.
+/// One trial in `dataset.toml`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TrialEntry {
     /// Its file, below the folder of the data set.
@@ -210,7 +210,7 @@ pub struct Description {
     pub synthetic: bool,
     /// Whose arm it is.
     pub subject: Subject,
-    /// What the calibration promises.
+    /// Tolerances of the calibration.
     pub tolerance: Tolerance,
     /// Masses that are worn in some configurations besides the model.
     pub added: Vec<AddedMass>,

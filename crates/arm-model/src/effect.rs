@@ -43,7 +43,7 @@ pub enum Site {
 }
 
 impl Site {
-    /// The index by which the core knows it.
+    /// Its index in the core.
     pub fn index(self) -> usize {
         match self {
             Self::Whole => 0,

@@ -189,7 +189,7 @@ impl Joint {
         joint
     }
 
-    /// The same joint stating an effect as well; none where its keys cannot say all of it, or are taken.
+    /// The same joint stating an effect as well; none where its keys cannot express all of it, or are taken.
     #[must_use]
     pub fn stating(&self, effect: &Effect) -> Option<Self> {
         if self.states(effect.kind()) {
@@ -199,7 +199,7 @@ impl Joint {
         let defaults = effect.kind().info().parameters.iter().map(|p| p.default);
         for ((name, value), default) in effect.parameters().zip(defaults) {
             match key_of(effect.kind(), name) {
-                // A joint has no negative spring; a fit may find one, and an effect may say it.
+                // A joint has no negative spring; a fit may find one, and an effect may state it.
                 Some(key) => *(key.of)(&mut joint) = key.bounds().check(key.name, value).ok()?,
                 None if value == default => {}
                 None => return None,

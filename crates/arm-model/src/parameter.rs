@@ -204,19 +204,6 @@ fn own(object: Object, name: &str) -> Option<&'static Entry> {
 }
 
 impl ParameterId {
-    /// A parameter of an effect: of the first of its kind at its place.
-    ///
-    /// # Errors
-    /// [`Refused`] for a parameter that the kind does not have.
-    pub fn of_effect(effect: &Effect, parameter: &str) -> Result<Self, Refused> {
-        Self::in_effect(
-            Object::of(effect.kind(), effect.site()),
-            effect.kind(),
-            0,
-            parameter,
-        )
-    }
-
     fn in_effect(object: Object, kind: Kind, nth: usize, parameter: &str) -> Result<Self, Refused> {
         let known = kind.info().parameters;
         match known.iter().find(|p| p.name == parameter) {
@@ -468,7 +455,7 @@ impl Model {
                     let effects = self.joints[k].effects(k);
                     effects.iter().find(|e| e.kind() == kind)?.value(parameter)
                 }
-                // A joint has its keys whether they say something or not.
+                // A joint has its keys whether they are set or not.
                 None if nth == 0 => self.joints.get(index)?.value(kind, parameter),
                 None => None,
             },
@@ -524,7 +511,7 @@ impl Model {
         Self::new(parts)
     }
 
-    /// The same model with other effects in its joints: those that a joint's keys can say stand there, the others are listed
+    /// The same model with other effects in its joints: those that a joint's keys can express stand there, the others are listed
     /// before `others`.
     ///
     /// # Errors
@@ -551,7 +538,7 @@ impl Model {
     }
 }
 
-/// Changes a parameter of an effect that a joint's keys state; what they cannot say takes the effect to the list.
+/// Changes a parameter of an effect that a joint's keys state; a value that they cannot express moves the effect to the list.
 fn change_joint(
     parts: &mut Parts,
     index: usize,

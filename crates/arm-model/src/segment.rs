@@ -118,7 +118,7 @@ impl Segment {
     pub fn with_mass(&self, mass: f64, at: f64) -> Self {
         let total = self.mass + mass;
         let com = (self.mass * self.com + mass * at) / total;
-        // Between the two whatever rounding says: a segment's end is as far as a model may have it.
+        // Between the two at any rounding: a segment's end is as far as a model may have it.
         let com = com.clamp(self.com.min(at), self.com.max(at));
         let normal = self.mass * self.com_normal / total;
         let square = |value: f64| value * value;

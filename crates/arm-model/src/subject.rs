@@ -62,7 +62,7 @@ impl Subject {
         })
     }
 
-    /// What the arm by the literature needs, and is not said; none where all is.
+    /// The first value that an arm by the literature needs and that is not stated; none where all are.
     pub fn lacks(&self) -> Option<&'static str> {
         let said = [
             ("body_mass", self.body_mass.is_some()),

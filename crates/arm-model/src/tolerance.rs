@@ -2,7 +2,7 @@ use crate::fields::{Bounds, Fields};
 use crate::value::by_value;
 use crate::{Refused, Table, Value};
 
-/// What the calibration promises, each as one standard deviation. Smaller deviations are absorbed and reported, larger ones
+/// Tolerances of the calibration, each as one standard deviation. Smaller deviations are absorbed and reported, larger ones
 /// are named.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
@@ -30,7 +30,7 @@ impl Default for Tolerance {
     }
 }
 
-/// A key: its name, the most that no calibration promises less than, and its value.
+/// A key: its name, its largest value, and its field.
 type Key = (&'static str, f64, fn(&mut Tolerance) -> &mut f64);
 
 const KEYS: [Key; 5] = [

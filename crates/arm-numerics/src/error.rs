@@ -14,7 +14,7 @@ pub enum NumericsError {
         /// The length that fits the other arguments.
         expected: usize,
     },
-    /// There are too few values for what was asked.
+    /// There are too few values for the computation.
     #[error("{name}: found {found}, expected at least {expected}")]
     TooFew {
         /// What is counted.
@@ -56,7 +56,7 @@ pub enum NumericsError {
         /// Its upper bound.
         upper: f64,
     },
-    /// The data leave a parameter undetermined where a unique answer was asked for.
+    /// The data leave a parameter undetermined where a unique solution is required.
     #[error("{name} has rank {found}, expected {expected}")]
     Rank {
         /// The matrix.

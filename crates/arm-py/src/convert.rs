@@ -162,7 +162,7 @@ fn room(rows: usize, width: usize) -> PyResult<Vec<f64>> {
     Ok(room)
 }
 
-/// The first of many values that is not finite: looked for only where a whole stretch of them is not.
+/// The first of many values that is not finite: searched for only where a whole stretch of them is not.
 fn first_not_finite(values: &[f64]) -> Option<usize> {
     let finite = |v: &f64| v.is_finite();
     let mut stretches = values.chunks(64).enumerate();
@@ -283,7 +283,7 @@ impl<F: Kernel<K>, const K: usize, const N: usize> Computation for Groups<'_, F,
     }
 }
 
-/// Calls `f` for every row in its order, each with `width` results: for what remembers the rows before.
+/// Calls `f` for every row in its order, each with `width` results: for functions with memory.
 ///
 /// All arguments are batches of the same length.
 pub fn in_order<'py, const K: usize>(
@@ -308,7 +308,7 @@ pub fn in_order<'py, const K: usize>(
     Ok(array.into_pyarray(py))
 }
 
-/// Refuses with `MemoryError` what needs more bytes than this process can get, where the system tells.
+/// Refuses with `MemoryError` what needs more bytes than this process can get, where the system states that.
 #[pyfunction]
 pub fn require_room(needed: u64) -> PyResult<()> {
     arm_sim::require_room(needed).map_err(simulation)

@@ -128,7 +128,7 @@ pub fn identification(error: impl Into<IdentError>) -> PyErr {
     }
 }
 
-/// An error that says which trial it is of, from 0; Python, which knows the files, names it.
+/// An error with its trial, from 0; Python, which has the files, names it.
 fn of_trial(error: PyErr, index: usize) -> PyErr {
     Python::attach(|py| match error.value(py).setattr("trial", index) {
         Ok(()) => error.clone_ref(py),
@@ -163,7 +163,7 @@ fn in_python(class: &str, text: &str) -> PyErr {
     })
 }
 
-/// A refusal or failure of a simulation: what was asked wrongly is `BadInput`, a run that stopped is `SimulationError`.
+/// A refusal or failure of a simulation: wrong input is `BadInput`, a run that stopped is `SimulationError`.
 pub fn simulation(error: SimulationError) -> PyErr {
     match error {
         SimulationError::Invalid(error) => invalid(error),

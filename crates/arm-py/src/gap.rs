@@ -8,7 +8,7 @@ use arm_gap::GapError;
 use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::results as core;
-use arm_gap::results::{Asked, TrialFile, Version};
+use arm_gap::results::{SearchInput, TrialFile, Version};
 use arm_gap::selection::model_discrimination::Contest;
 use arm_ident::threads::parallel;
 use pyo3::exceptions::PyException;
@@ -32,7 +32,7 @@ pub struct Settings {
     tolerance: Py<model::Tolerance>,
     /// Whether a robot's own path is compared through the closed chain; else joint torques are.
     led: bool,
-    /// What the samples of each trial weigh; see [`Session::weights`].
+    /// Weights of the samples of each trial; see [`Session::weights`].
     weights: Vec<f64>,
     threads: usize,
     /// Names of user-defined kinds that are tested besides the catalogue.
@@ -88,8 +88,8 @@ impl<'a, 'py> Call<'a, 'py> {
         self.trials.iter().map(file).collect()
     }
 
-    fn asked<'s>(&'s self, trials: &'s [TrialFile]) -> Asked<'s> {
-        Asked {
+    fn asked<'s>(&'s self, trials: &'s [TrialFile]) -> SearchInput<'s> {
+        SearchInput {
             model: self.settings.model.get().inner(),
             force_on_robot: self.settings.force_on_robot,
             trials,
@@ -138,7 +138,7 @@ pub fn play(
         let files: Vec<&str> = call.trials.iter().map(|c| c.file.as_str()).collect();
         let one = |i: usize| {
             let course = Arc::new(session.course(i)?);
-            // What cannot be simulated is told of below, with its trial.
+            // A trial that cannot be simulated is reported below.
             let believed = match own {
                 true => session.in_trial((&given, &[]), &course).ok(),
                 false => None,
@@ -201,7 +201,7 @@ pub fn find_gap(
     each_short_length!(&rig.arm.chain, c => run(py, c, &call, progress.as_ref()))
 }
 
-/// Calibrates a model, and asks every candidate alone to first order; see `armrs.gap.calibrate`.
+/// Calibrates a model, and tests every candidate alone to first order; see `armrs.gap.calibrate`.
 #[pyfunction]
 #[pyo3(signature = (rig, trials, settings, progress=None))]
 pub fn look(

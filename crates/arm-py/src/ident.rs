@@ -7,7 +7,7 @@ use arm_core::{Chain, Joints};
 use arm_ident::inference::joint_method::{MotionSource, Options};
 use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
 use arm_ident::results as core;
-use arm_ident::results::{Asked, TrialName};
+use arm_ident::results::{IdentificationInput, TrialName};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -233,7 +233,7 @@ pub fn identify(
             role: trial.role,
             configuration: c.configuration.clone(),
         });
-        let asked = Asked {
+        let asked = IdentificationInput {
             model: settings.model.get().inner(),
             effects: &rig.effects,
             trials: &names.collect::<Vec<_>>(),

@@ -97,7 +97,7 @@ fn fault(kind: &str, joint: usize, size: (f64, f64)) -> PyResult<Fault> {
     }
 }
 
-/// Lets the robot's controller lead an arm, watched by the safety supervisor; see `armrs.record`.
+/// The robot's controller leads an arm, monitored by the safety supervisor; see `armrs.record`.
 #[pyfunction]
 pub fn control<'py>(
     py: Python<'py>,
@@ -144,7 +144,7 @@ fn stopped(s: &arm_core::monitor::Stop<f64>) -> (&'static str, Option<usize>, f6
     (s.reason.name(), s.channel, s.value, s.limit, at)
 }
 
-/// Lets a yielding robot lead an arm that motors in its joints may carry; see `armrs.record`.
+/// A compliant robot leads an arm that motors in its joints may carry; see `armrs.record`.
 ///
 /// Parameters
 /// ----------

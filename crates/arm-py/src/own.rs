@@ -118,7 +118,7 @@ fn parameter((name, unit, min, max, default, linear, _): Asked) -> Parameter {
     }
 }
 
-/// Asks a law for its table, unless it is being asked: one that simulates an arm with this very effect would never end.
+/// Calls a law for its table, unless a call is active: one that simulates an arm with this very effect would never end.
 fn ask_once(
     me: &'static str,
     tabulate: &Py<PyAny>,

@@ -344,7 +344,7 @@ enum Natural {
 
 type Begun<const N: usize> = (Drive<N>, Option<Joints<f64, N>>, Option<Natural>);
 
-/// The drive, the angles it starts from where it says so, and how long it lasts.
+/// The drive, the angles it starts from if it states them, and its duration.
 fn driven<const N: usize>(
     chain: &Chain<f64, N>,
     rig: &Rig,
@@ -425,7 +425,7 @@ fn driven<const N: usize>(
     }
 }
 
-/// What stands for every bit of a run, which takes a quarter as long as the run; see `armrs.Simulated`.
+/// Digest of every bit of a run, which takes a quarter as long as the run; see `armrs.Simulated`.
 #[pyclass(module = "armrs._armrs")]
 pub struct Digest(arm_sim::Digest);
 

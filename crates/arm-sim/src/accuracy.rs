@@ -1,4 +1,4 @@
-//! Runs of which the angles are right to a stated accuracy: the step is found by comparing runs.
+//! Runs with angles of a stated accuracy: the step is found by comparing runs.
 //!
 //! On a uniform grid the error of the fourth-order method is `C hᵖ` at every sample, so that two runs with steps h and r h differ
 //! by `(rᵖ − 1)` times the error of the finer one (Richardson 1911). The order p is 4 where all is smooth. Where something is not (dry
@@ -22,13 +22,13 @@ use crate::{
 const ORDER: f64 = 4.0;
 /// The first step, as a fraction of the largest that is stable.
 const FIRST: f64 = 0.5;
-/// What a step that is foretold to be fine enough leaves of the accuracy.
+/// Share of the accuracy that the predicted error of the next step may reach.
 const AIM: f64 = 0.7;
-/// How much finer the next run is, at least and at most: nearer to the last, their difference says little.
+/// How much finer the next run is, at least and at most: a smaller ratio gives a poor estimate of the error.
 const FINER: (f64, f64) = (1.5, 8.0);
 /// Shortest step that is tried \[s\].
 const SHORTEST: f64 = 1e-6;
-/// Samples after which [`resolve`] asks whether to go on: with the shortest step, half a second at 50 Hz.
+/// Samples after which [`resolve`] checks for an interrupt: with the shortest step, half a second at 50 Hz.
 const PIECE: usize = 64;
 
 /// The step of a run, and how far its angles are from those of an ever finer one.
@@ -97,7 +97,7 @@ pub fn simulate_accurately<const N: usize>(
 
 /// The step of [`simulate_accurately`] for one experiment; of the runs nothing but their angles is kept.
 ///
-/// * `go_on` - asked every now and then; `None` where it breaks the search off
+/// * `go_on` - called between pieces of a run; `None` ends the search
 ///
 /// # Errors
 /// As [`simulate_accurately`].
@@ -192,7 +192,7 @@ impl<const N: usize> Search<N> {
         Ok(search)
     }
 
-    /// Starts at the equilibrium that a run has found; a rigid coupling projects its start, and is left to look for it again.
+    /// Starts at the equilibrium that a run has found; with a rigid coupling, which projects its start, it is computed again.
     fn start_as_before(&mut self, columns: [&[f64]; 2]) {
         let is_compliant = !matches!(
             self.experiment.drive,
@@ -207,7 +207,7 @@ impl<const N: usize> Search<N> {
         }
     }
 
-    /// Judges a run by its angles and speeds: `None` where another one is asked for.
+    /// Checks a run by its angles and speeds: `None` where another run is needed.
     fn judge(
         &mut self,
         run: Result<[&[f64]; 2], &SimulationError>,
@@ -261,7 +261,7 @@ impl<const N: usize> Search<N> {
         if self.is_smooth { 1 } else { 2 }
     }
 
-    /// The largest error of the angles that the coarser runs tell; nothing where there are too few.
+    /// The largest error of the angles, estimated from the coarser runs; `None` where there are too few.
     fn error(&self, angles: &[f64]) -> Option<f64> {
         let order = if self.is_smooth { ORDER } else { 1.0 };
         let beside = |coarser: &Coarser| {

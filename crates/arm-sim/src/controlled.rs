@@ -1,7 +1,7 @@
 //! The robot of the laboratory: its joint controller, and the safety supervisor that watches it (thesis section 3.3).
 //!
 //! The robot is two joints with the inertia of motors and gears, which count more than those of its links. In every control
-//! period the supervisor looks first; then the controller follows the required angles by acceleration fed forward and
+//! period the supervisor checks first; then the controller follows the required angles by acceleration fed forward and
 //! proportional, derivative and integral feedback; then robot and arm move on through their contact.
 
 use arm_core::monitor::Stop;
@@ -47,18 +47,18 @@ impl Default for Controller {
     }
 }
 
-/// Something that goes wrong on purpose.
+/// A fault that is injected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
     /// The motor of a joint gives all its torque, whatever the command.
     Runaway(usize),
     /// The encoder of a joint keeps its value.
     Frozen(usize),
-    /// The encoder of a joint reads not a number.
+    /// The encoder of a joint reads NaN.
     NotANumber(usize),
     /// Data come late by this \[s\].
     Late(f64),
-    /// Something presses against the handle \[N\].
+    /// A force acts on the handle \[N\].
     Pressed(Plane<f64>),
 }
 
@@ -83,14 +83,14 @@ pub struct Controlled {
 
 /// Time that is recorded after a stop \[s\].
 pub(crate) const AFTER_STOP: f64 = 0.25;
-/// Time constant of the speed that the controller sees \[s\].
+/// Time constant of the controller's speed filter \[s\].
 pub(crate) const SPEED_FILTER: f64 = 0.5e-3;
 /// Ratio of the time of the integral feedback to that of the loop.
 const INTEGRAL_TIME: f64 = 10.0;
 
-/// Lets the robot lead the arm of an experiment with its controller, under the eyes of the supervisor.
+/// The robot leads the arm of an experiment with its controller, monitored by the supervisor.
 ///
-/// The experiment's drive says what is required of the robot. The run ends with the experiment, or a quarter of a second after a stop.
+/// The experiment's drive is the required motion of the robot. The run ends with the experiment, or a quarter of a second after a stop.
 ///
 /// * `fault` - what goes wrong, and when \[s\]
 /// * `seed` - of the sensors' noise
@@ -299,7 +299,7 @@ impl<'a, const N: usize> Loop<'a, N> {
                 + self.integral[i];
             let given = match fault {
                 Some(Fault::Runaway(joint)) if joint == i => c.torque_limit,
-                // A driver makes nothing of a command that is not a number.
+                // A driver ignores a command that is not a number.
                 _ if torque.is_nan() => 0.0,
                 _ => torque.clamp(-c.torque_limit, c.torque_limit),
             };

@@ -1,4 +1,4 @@
-//! A number that stands for every bit of a recording.
+//! A digest of every bit of a recording.
 
 use crate::{Piece, Recording, SimulationError};
 

@@ -3,8 +3,8 @@
 //! A method has its order where what it integrates is smooth within each step. Simpson's rule, which is what Rk4 makes of the
 //! handle's work `∫ F·v dt`, is wrong by up to `h²/24 · F·Δa` where the acceleration jumps by Δa inside a step, by an amount
 //! that depends on where. A rigid coupling passes the jump on to its force, and is wrong by `h/6 · ΔF·v` already where the
-//! acceleration at the end of a step is that after the jump. So steps end at every such time, and each piece sees the drive as
-//! it is within that piece.
+//! acceleration at the end of a step is that after the jump. So steps end at every such time, and the drive of each piece is
+//! that inside the piece.
 
 use crate::schedule::Schedule;
 use crate::{Coupling, Drive, Experiment};
@@ -27,7 +27,7 @@ pub(crate) struct Break {
 impl Discontinuities {
     /// The breaks of an experiment.
     ///
-    /// On the grid they matter only where a value jumps that the arm feels at once: the acceleration of a handle that holds it
+    /// On the grid they matter only where a value jumps that acts on the arm directly: the acceleration of a handle that holds it
     /// rigidly, or a torque.
     pub fn of<const N: usize>(experiment: &Experiment<N>, schedule: &Schedule) -> Self {
         let (times, felt) = match &experiment.drive {
@@ -44,7 +44,7 @@ impl Discontinuities {
         for time in times {
             let steps = time / schedule.dt;
             let nearest = (steps + 0.5).floor();
-            // What lies before the start or after the end is nobody's.
+            // Breaks before the start or after the end are in no step.
             if !(-0.5..=schedule.steps as f64 + 0.5).contains(&steps) {
                 continue;
             }

@@ -6,7 +6,7 @@ use crate::prepare::Prepared;
 use crate::state::{Input, State};
 use crate::step::{Inputs, Memory};
 
-/// How far into a piece its ends are looked at from, as a fraction of the piece.
+/// Distance from the ends of a piece at which one-sided values are taken, as a fraction of the piece.
 const INWARD: f64 = 1e-6;
 
 /// Makes one step of the grid, in pieces where the drive breaks.

@@ -13,7 +13,7 @@ const LONGEST: f64 = 0.05;
 const LONGEST_OF_NEWTON: f64 = 0.3;
 /// Steps after which a search is given up.
 const ITERATIONS: usize = 500;
-/// Way of an angle after which an arm counts as falling away \[rad\].
+/// Change of an angle after which an arm counts as falling \[rad\].
 const AWAY: f64 = 4.0 * core::f64::consts::PI;
 /// Increment of differences \[rad or N\].
 const SMALL: f64 = 1e-6;
@@ -36,7 +36,7 @@ impl Balance<'_> {
     /// The angles at which the arm comes to rest from those it starts from, and the forces of a constraint there.
     ///
     /// # Errors
-    /// [`SimulationError::NoEquilibrium`] says why there are none.
+    /// [`SimulationError::NoEquilibrium`] with the reason.
     pub fn settle(&self, mut x: Vec<f64>) -> Result<Vec<f64>, SimulationError> {
         let from = x.clone();
         let mut r = (self.residual)(&x);
@@ -103,7 +103,7 @@ impl Balance<'_> {
                 }
             }
         }
-        // What a constraint demands is not shortened by damping.
+        // The correction of a constraint is not shortened by damping.
         let step = step?;
         Some(along(&step, (LONGEST / length(&step)).min(1.0)))
     }
@@ -164,7 +164,7 @@ impl Slopes {
             a[i][i] += damping;
         }
         for k in 0..n {
-            // Not a number is not positive.
+            // NaN is not positive.
             if a[k][k].partial_cmp(&0.0) != Some(core::cmp::Ordering::Greater) {
                 return false;
             }

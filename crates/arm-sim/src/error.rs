@@ -113,10 +113,10 @@ pub enum SimulationError {
         time: f64,
         /// Zero-based joint.
         joint: usize,
-        /// What a newton metre of it adds to it \[N m\].
+        /// Its loop gain through the joint force \[N m per N m\].
         gain: f64,
     },
-    /// An accuracy that no step reaches which is not too short.
+    /// An accuracy that no admissible step reaches.
     #[error(
         "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {asked:e} rad; steps shorter than 1e-6 s are not tried"
     )]
@@ -141,7 +141,7 @@ pub enum SimulationError {
     Unsupported {
         /// Name of the engine.
         engine: &'static str,
-        /// What was asked of it.
+        /// The feature that was requested.
         what: &'static str,
     },
 }

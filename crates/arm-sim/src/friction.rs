@@ -1,8 +1,8 @@
 //! Steps with dry friction, which is solved for: a joint slips one way or sticks, and switches between these are located.
 //!
-//! The torque of dry friction is set-valued: c against the motion, and at rest whatever holds the joint within −c to c. Made
-//! smooth it is so stiff that an explicit method needs steps far below those of everything else. So the state says by speeds
-//! that are exactly zero which joints may stick; [`instant`] finds which of them do; between two switches the motion is smooth
+//! The torque of dry friction is set-valued: c against the motion, and at rest any torque from −c to c that holds the joint.
+//! Smoothed, it is so stiff that an explicit method needs steps far below those of everything else. So joints whose speed in
+//! the state is exactly zero may stick; [`instant`] finds which of them do; between two switches the motion is smooth
 //! and a step has the order of its integrator. A step in which a speed reaches zero, or a torque what friction holds at most,
 //! ends there, and another one makes the rest of it: the switch is located as in Shampine, Gladwell, Brankin 1991.
 //!
@@ -31,7 +31,7 @@ use arm_core::effect::States;
 
 /// Switches that are located in one step.
 const MOST_SWITCHES: usize = 12;
-/// Most of a time constant of friction that falls with speed that a part of a step lasts.
+/// Longest part of a step, in time constants of friction that falls with speed.
 const RESOLVED: f64 = 0.3;
 /// Shortest part of a step that is made for that, as a fraction of the step.
 const SHORTEST: f64 = 1.0 / 128.0;
@@ -116,7 +116,7 @@ fn switching<const N: usize>(
     implicit(model, (rest, 0.5), [&start, inputs.end], (state, memory));
 }
 
-/// What is left of a step, while no joint switches.
+/// The rest of a step, while no joint switches.
 struct Part<'a, const N: usize> {
     model: &'a Model<f64, N>,
     inputs: &'a Inputs<'a, f64, N>,
@@ -131,8 +131,8 @@ struct Part<'a, const N: usize> {
 impl<const N: usize> Part<'_, N> {
     /// Where it ends if nothing switches, as a fraction of the step.
     ///
-    /// Friction that falls with speed makes a joint that begins to slip run away from rest; the step must not be longer than
-    /// that takes, or the slip begins a step too late.
+    /// With friction that falls with speed, the speed of a joint that begins to slip grows exponentially; the step must not be
+    /// longer than its time constant, or the slip begins a step too late.
     fn end(&self, arm: &Arm<'_, N>, memory: &[States<f64>]) -> f64 {
         let rest = 1.0 - self.from;
         if !self.model.dry_falls {
@@ -164,7 +164,7 @@ impl<const N: usize> Part<'_, N> {
             (RESOLVED / (rate * self.h)).max(SHORTEST)
         };
         let least = allowed(rest);
-        // Not a number is no reason for parts.
+        // NaN does not divide a step.
         if least >= rest || least.is_nan() {
             return 1.0;
         }
@@ -172,8 +172,8 @@ impl<const N: usize> Part<'_, N> {
         self.from + now.min(allowed(now))
     }
 
-    /// Makes the step up to a fraction of it, and tells how far the joint that is nearest to a switch is from it; below zero
-    /// it is beyond.
+    /// Makes the step up to a fraction of it, and returns the smallest margin of a joint to a switch; it is negative
+    /// beyond the switch.
     fn attempt(&self, to: f64, (state, memory): (&mut State<f64, N>, &mut Memory<f64>)) -> f64 {
         *state = self.before;
         memory.state.copy_from_slice(&memory.kept);
@@ -229,7 +229,7 @@ impl<const N: usize> Part<'_, N> {
                 Mode::Sticks => instant::reserve(last, j),
                 Mode::None | Mode::Slips(_) => continue,
             };
-            // Not a number counts as the nearest.
+            // NaN counts as the smallest margin.
             margin = if distance >= margin { margin } else { distance };
         }
         margin
@@ -288,7 +288,7 @@ fn implicit<const N: usize>(
         } else {
             before + h * now.outcome.qdd[j]
         };
-        // An impulse takes energy by the mean of the speeds before and after it.
+        // The energy of an impulse is its product with the mean of the speeds before and after it.
         power[2] += now.dry.torque[j] * 0.5 * (after - before);
         state.qd[j] = after;
         state.q[j] += h * (before + share * (after - before));

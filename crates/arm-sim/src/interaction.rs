@@ -1,4 +1,4 @@
-//! A robot whose handle yields (impedance and admittance control, Hogan 1985), while motors in the joints may carry the arm.
+//! A robot with a compliant handle (impedance and admittance control, Hogan 1985), while motors in the joints may carry the arm.
 //!
 //! Both laws give the handle a behaviour about the required motion `x_d`. The impedance law commands the force
 //! `K (x_d − x) + D (ẋ_d − ẋ)` through the model of the robot, of which the inertia remains. The admittance law reads the force sensor, moves a
@@ -15,7 +15,7 @@ use crate::noise::Normal;
 use crate::supervisor::{Supervisor, encoder_step, sensed};
 use crate::{Controller, Experiment, JointMotion, Safety, SimulationError};
 
-/// How the handle answers a force.
+/// How the handle responds to a force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
     /// Motion in, force out.
@@ -24,7 +24,7 @@ pub enum Law {
     Admittance,
 }
 
-/// What the handle behaves like, in y and z alike, and the links behind it.
+/// Impedance or admittance of the handle, in y and z alike, and the links behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interaction {
     /// Which of the two.
@@ -51,7 +51,7 @@ impl Default for Interaction {
     }
 }
 
-/// What carries the arm: the torque for time \[s\] and angles \[rad\], `None` where there is none that can be trusted.
+/// The torque that carries the arm, for time \[s\] and angles \[rad\]; `None` where none is valid.
 pub type Support<'a, const N: usize> =
     &'a mut dyn FnMut(f64, &Joints<f64, N>) -> Option<Joints<f64, N>>;
 
@@ -81,7 +81,7 @@ const SETTLING: f64 = 3.0;
 /// Control periods from one torque of the support to the next; it acts one such time after its angles were read.
 const SUPPORT_PERIODS: usize = 4;
 
-/// Lets a yielding robot lead the arm of an experiment, under the eyes of the supervisor.
+/// A robot with a compliant handle leads the arm of an experiment, monitored by the supervisor.
 ///
 /// Ends with the experiment, or a quarter of a second after a stop, when brakes hold the robot and nothing carries the arm. A stop while the arm
 /// settles counts as one at the start.
@@ -140,7 +140,7 @@ pub fn interact<const N: usize>(
         }
         let read = loop_.encoders();
         if stopped_at.is_none() {
-            // A robot that moves has encoders that change, whatever was required.
+            // The encoders of a robot that moves change, even where the required angles do not.
             let moving = JointMotion {
                 qd: loop_.body.qd,
                 ..*wanted

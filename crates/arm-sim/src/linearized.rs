@@ -1,12 +1,12 @@
 //! The equation of motion linearised along a run, `M δq̈ + D δq̇ + K δq = p`, and its solution step by step.
 //!
-//! The one place that solves it. Identification asks how unknowns move an arm that its robot does not hold, the gap search how the sensors
-//! answer a change; each has its own equation of motion. It is solved implicitly, so that a stiff contact and dry friction need no short steps.
+//! The one place that solves it. Identification computes how unknowns move an arm that its robot does not hold, the gap search how the
+//! readings of sensors change; each has its own equation of motion. It is solved implicitly, so that a stiff contact and dry friction need no short steps.
 
 use arm_core::{Joints, Plane};
 use nalgebra::SMatrix;
 
-/// How far into a step its rates count: a little beyond the middle, so that fast vibrations die out.
+/// Point of a step at which its rates count: a little beyond the middle, so that fast vibrations are damped.
 const THETA: f64 = 0.55;
 /// Change of an angle for difference quotients \[rad\].
 const ANGLE: f64 = 1e-6;
@@ -109,7 +109,7 @@ impl<const N: usize> Change<N> {
 
     /// Solves a step \[s\].
     ///
-    /// * `inverse` - of [`Slopes::of_step`], with nothing for joints that do not answer
+    /// * `inverse` - of [`Slopes::of_step`], zero for joints that do not move
     /// * `push` - torque that is left over at the end of the step \[N m\]
     pub fn advance(
         &mut self,

@@ -84,7 +84,7 @@ pub fn led<const N: usize>(
     Ok(experiment)
 }
 
-/// The run whose digest stands for the bits of the simulator: two seconds of the human arm with a robot, damped contact and
+/// The run whose digest represents the bits of the simulator: two seconds of the human arm with a robot, damped contact and
 /// effects of every kind that a run computes differently (friction with the hyperbolic tangent, exponential end stops,
 /// states of their own, joint forces, a moving base, ripple).
 ///

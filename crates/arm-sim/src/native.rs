@@ -137,8 +137,8 @@ pub(crate) trait PlainSteps<T: Scalar, const N: usize> {
         }
     }
 
-    /// What is not finite stays so: it is looked for after all of the steps, and only where there is any they are made again one
-    /// by one.
+    /// A state that is not finite stays so: it is checked after all of the steps, and only if the check fails they are repeated
+    /// one by one.
     #[inline(always)]
     fn strides<const FOURTH: bool>(&self, steps: usize, state: &mut State<T, N>) -> usize {
         let (mut made, mut stride) = (0, if state.is_finite() { steps } else { 1 });

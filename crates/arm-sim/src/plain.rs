@@ -1,4 +1,4 @@
-//! A rig without anything that a step would have to ask for.
+//! A rig whose steps need no decisions.
 
 use arm_core::{
     Chain, Contact, Joints, Lanes, Load, Plane, Pose, Products, Scalar, accelerations, tip,
@@ -8,8 +8,8 @@ use arm_core::{
 use crate::Handle;
 use crate::state::{Outcome, difference, powers};
 
-/// A rig of which a step takes no decision: its base stands still, its tip is on springs and dampers without play, no motors
-/// turn its joints, and all that resists in these is linear in their motion.
+/// A rig whose steps need no decisions: its base is at rest, its tip is held by springs and dampers without play, its joints
+/// have no motors, and resisting torques are linear in their motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain<T, const N: usize> {
     pub chain: Chain<T, N>,

@@ -39,7 +39,7 @@
 //! - joints that are not soft: 1e9 Hz, at which a joint's error is removed within one step;
 //! - forces that are found to the last: 30 sweeps, from those of the step before.
 //!
-//! What each is worth, table 4.10 in 4 s with damping, 0.25 ms (first order unless said):
+//! Their errors, table 4.10 in 4 s with damping, 0.25 ms (first order unless stated):
 //!
 //! | | angles \[rad\] | force \[N\] |
 //! | --- | --- | --- |
@@ -64,7 +64,7 @@
 //! - A rotor turns against two segments, which no inertia of a body can express; it is a damper of rapier's motor,
 //!   which makes it exact but the solver slow: eight times as many sweeps. A rotor beyond about 15 times the inertia of the
 //!   segments that it turns needs still more; where they are by far too few the run does not stay finite.
-//! - Dry friction is a motor that wants the joint to rest and has no more torque than the friction. Where a joint is fast enough
+//! - Dry friction is a motor with the target speed zero and no more torque than the friction. Where a joint is fast enough
 //!   that it cannot stop within the step it is a torque. Switches between sticking and slipping are not located: at each the
 //!   speed is off by up to the step times the change of the acceleration, of first order.
 //! - Friction that grows with the joint force takes the force that acts, extrapolated from the two steps before; the native

@@ -295,7 +295,7 @@ impl<'a, 't, const N: usize> Recorder<'a, 't, N> {
         })
     }
 
-    /// Appends an instant, of which `of` reads the numbers of this run. Breaks where nobody wants more of it.
+    /// Appends an instant, of which `of` reads the numbers of this run. Breaks where no more is needed.
     pub fn push<T>(&mut self, row: &Row<T>, of: impl Fn(&T) -> f64) -> ControlFlow<()> {
         let mut rest = row.0.as_slice();
         for (column, width) in columns(&mut self.recording, self.prepared) {

@@ -1,10 +1,10 @@
-//! Whether memory has room, asked before much of it is taken: an allocation that fails would end the process.
+//! Check of free memory before a large allocation: an allocation that fails would end the process.
 
 use std::fs::read_to_string;
 
 use crate::SimulationError;
 
-/// What is taken without a question \[bytes\]: the answer costs more than it.
+/// Largest allocation without a check \[bytes\]: the check costs more than it.
 const LITTLE: u64 = 64 << 20;
 
 /// Refuses what needs more bytes than this process can get: on Linux the least of what the system, the control group and the limit
@@ -39,7 +39,7 @@ pub fn reserve_room(column: &mut Vec<f64>, numbers: usize) -> Result<(), Simulat
     column.try_reserve_exact(numbers).map_err(refused)
 }
 
-/// Bytes that this process can still take, where the system tells.
+/// Bytes that this process can still allocate, where the system states it.
 fn available() -> Option<u64> {
     let free = read_to_string("/proc/meminfo").map(|table| kilobytes(&table, "MemAvailable:"));
     [free.ok().flatten(), address_space(), group()]

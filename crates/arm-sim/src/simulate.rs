@@ -13,7 +13,7 @@ use crate::{Experiment, Partial, Piece, Recording, SimulationError, native};
 pub enum Engine {
     /// Minimal coordinates: the joint angles.
     Native,
-    /// Maximal coordinates: rigid bodies and joints, solved by rapier. A second opinion.
+    /// Maximal coordinates: rigid bodies and joints, solved by rapier. For comparison.
     #[cfg(feature = "rapier")]
     Rapier,
 }
@@ -21,7 +21,7 @@ pub enum Engine {
 /// Simulates an experiment with the native engine.
 ///
 /// # Errors
-/// [`SimulationError`] says what was refused, or at which step and joint the state ceased to be finite.
+/// [`SimulationError`] with the refused value, or the step and joint at which the state ceased to be finite.
 pub fn simulate<const N: usize>(
     experiment: &Experiment<N>,
 ) -> Result<Recording<N>, SimulationError> {
@@ -49,7 +49,7 @@ pub fn simulate_with<const N: usize>(
 /// The samples have the bits of [`simulate_with`]. A run that stops early has given what was recorded before.
 ///
 /// * `samples` - in each piece but the last
-/// * `take` - gets every piece, and breaks the run off where it wants no more
+/// * `take` - gets every piece, and may end the run
 ///
 /// # Errors
 /// As [`simulate`].

@@ -40,7 +40,7 @@ impl<T: Scalar> BaseMotion<T> {
 }
 
 impl<T: Scalar, const N: usize> Input<T, N> {
-    /// An arm that moves at this instant, as effects see it; without accelerations and joint forces.
+    /// Motion of the arm at this instant, the input of effects; without accelerations and joint forces.
     #[inline]
     pub fn motion(&self, q: &Joints<T, N>, qd: &Joints<T, N>) -> Motion<T, N> {
         Motion {
@@ -49,7 +49,7 @@ impl<T: Scalar, const N: usize> Input<T, N> {
         }
     }
 
-    /// Puts the handle where it stands in a rig, beside where it is commanded, and the base where it heaves.
+    /// Adds the displacement of the handle in a rig to its commanded position, and the motion of a heaving base.
     #[inline]
     pub fn stands_as_in(&mut self, setup: &Setup<T, N>) {
         if setup.displaced.is_somewhere() {

@@ -15,7 +15,7 @@ pub(crate) const PROJECTIONS: usize = 2;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inputs<'a, T, const N: usize> {
     pub start: &'a Input<T, N>,
-    /// Not looked at by semi-implicit Euler.
+    /// Not used by semi-implicit Euler.
     pub middle: &'a Input<T, N>,
     pub end: &'a Input<T, N>,
 }
@@ -35,7 +35,7 @@ pub(crate) struct Jam {
     pub time: f64,
     /// Zero-based joint.
     pub joint: usize,
-    /// What the friction adds to itself, through the force with which it grows.
+    /// Loop gain of the friction, through the joint force with which it grows.
     pub gain: f64,
 }
 
@@ -129,13 +129,13 @@ pub(crate) fn remember<T: Scalar, const N: usize>(
     }
 }
 
-/// What a step of Rk4 asks for at its stages. A trait, as closures cannot be made to be inlined.
+/// Evaluation of the stages of Rk4. A trait, as closures cannot be forced inline.
 pub(crate) trait Stages<T, const N: usize> {
-    /// What follows from angles and speeds at one of [`STAGES`], asked for in order.
+    /// What follows from angles and speeds at one of [`STAGES`], called in order.
     fn evaluate(&mut self, stage: usize, q: &Joints<T, N>, qd: &Joints<T, N>) -> Outcome<T, N>;
 }
 
-/// How far into a step each stage looks, as a fraction of the step, and its weight in the sum of slopes, in sixths.
+/// Time of each stage as a fraction of the step, and its weight in the sum of slopes, in sixths.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)];
 
 /// One step of the classical method.
@@ -172,7 +172,7 @@ pub(crate) fn fourth_order<T: Scalar, const N: usize>(
     }
 }
 
-/// One step of the classical method, of the states of effects too; `evaluate` says what follows from input, angles, speeds and
+/// One step of the classical method, with the states of effects; `evaluate` computes the outcome from input, angles, speeds and
 /// these.
 #[inline(always)]
 pub(crate) fn rk4<T: Scalar, const N: usize>(

@@ -16,7 +16,7 @@ use crate::{Handle, Integrator, SimulationError, stability, start};
 /// Most inner steps in one call of [`Stepper::advance`].
 const MOST_STEPS: f64 = 1e7;
 
-/// Where the arm is cut off from what it is coupled to. Force and velocity of either port make a power bond.
+/// The interface between the arm and its environment. Force and velocity of either port make a power bond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Port {
     /// A force on the arm at its tip comes in, position and velocity of the tip go out.
@@ -39,13 +39,13 @@ pub struct Outside<const N: usize> {
     pub velocity: Plane<f64>,
     /// Motion port: acceleration of the handle, held \[m/s²\].
     pub acceleration: Plane<f64>,
-    /// Time since handle or force were as they say \[s\].
+    /// Time since handle or force had the stated values \[s\].
     pub age: f64,
     /// Torques of motors in the joints when `torque_age` was zero \[N m\].
     pub torque: Joints<f64, N>,
     /// Their time derivatives, held \[N m/s\].
     pub torque_rate: Joints<f64, N>,
-    /// Time since the torques were as they say \[s\].
+    /// Time since the torques had the stated values \[s\].
     pub torque_age: f64,
 }
 
@@ -128,8 +128,8 @@ pub struct Seen<const N: usize> {
 /// An arm that is advanced by communication steps through one of its ports.
 ///
 /// It makes the steps of [`simulate`](crate::simulate): with the same inputs at the same inner steps both have the same bits.
-/// A ripple of the robot and a slip of the handle come on top of the handle that the motion port is given, as encoders do not see it either; a
-/// base that heaves does so in its own time.
+/// A ripple of the robot and a slip of the handle are added to the handle of the motion port, as encoders do not measure them; a
+/// heaving base follows its own time.
 ///
 /// ```
 /// use arm_sim::{Outside, Port, Stepper, models};
@@ -148,13 +148,12 @@ pub struct Seen<const N: usize> {
 pub struct Stepper<const N: usize> {
     setup: Setup<f64, N>,
     model: Model<f64, N>,
-    port: Port,
     dt: f64,
     state: State<f64, N>,
     memory: Memory<f64>,
     origin: f64,
     ticks: u64,
-    /// Room for the state before a step, so that a failed one leaves no trace.
+    /// Memory for the state before a step, to which a failed step returns.
     before: Snapshot<N>,
 }
 
@@ -203,7 +202,6 @@ impl<const N: usize> Stepper<N> {
         Ok(Self {
             setup,
             model,
-            port,
             dt,
             state,
             memory,
@@ -248,11 +246,6 @@ impl<const N: usize> Stepper<N> {
     ) -> Result<Joints<f64, N>, SimulationError> {
         self.apply(outside, 0.0);
         start::equilibrium(&self.model, &self.input(outside), near)
-    }
-
-    /// Which port this is.
-    pub fn port(&self) -> Port {
-        self.port
     }
 
     /// Number of effects, and so of those whose states are in a snapshot.
@@ -350,7 +343,7 @@ impl<const N: usize> Stepper<N> {
         Ok(())
     }
 
-    /// What can be seen from outside at the present state and inputs.
+    /// Outputs at the present state and inputs.
     pub fn seen(&mut self, outside: &Outside<N>) -> Seen<N> {
         self.apply(outside, 0.0);
         let State { q, qd, .. } = &self.state;

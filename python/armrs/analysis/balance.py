@@ -18,7 +18,7 @@ from ..model import Model
 _CUTOFF = 3.0
 """Cutoff of the low-pass that angles and forces share [Hz]."""
 SAMPLES = 800
-"""Samples that are regressed: more tell no more about a convention."""
+"""Samples that are regressed: enough to decide a convention."""
 BALANCED = 0.1
 """Share of the contact torques that the right reading of the columns leaves unexplained at most: in 99 of 100 of 128 sessions of two worlds
 with up to two hidden effects it leaves 0.07."""
@@ -33,7 +33,7 @@ _FIRST_MOMENTS = (0.5, 1.6)
 _INERTIA = (0.3, 3.0)
 """Inertia relative to the model's."""
 _NOTHING, _ALIKE = 1e-6, 1e8
-"""A regressor of less than this part of the largest does not act; regressors with a greater condition number are not told apart."""
+"""A regressor of less than this part of the largest does not act; regressors with a greater condition number are not distinguished."""
 _ELASTIC, _CONSTANT, _VISCOUS, _DRY = 5.0, 5.0, 3.0, 1.0
 """Most of the passive laws, in weight moments of the whole stretched arm per rad, alone, per rad/s and alone."""
 
@@ -130,7 +130,7 @@ def weight_of(model: Model, motions: Sequence[Motion]) -> tuple[float, float] | 
     Returns
     -------
     (float, float) or None
-        None where the motions do not tell the weight from springs of the joints, and for a single motion.
+        None where the motions do not distinguish the weight from springs of the joints, and for a single motion.
     """
     if len(motions) < 2:
         return None

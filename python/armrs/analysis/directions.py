@@ -11,7 +11,7 @@ MOVING = 0.25
 
 
 def told(q: np.ndarray, qd: np.ndarray, known: np.ndarray, margin: int) -> np.ndarray:
-    """Tell in which direction each joint moves; one that is held rests, whatever its noise.
+    """Return in which direction each joint moves; one that is held rests at any noise.
 
     `margin` samples beside every reversal count as rest: there the low-pass mixes both directions. So do those of unknown moment.
     """

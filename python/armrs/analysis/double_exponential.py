@@ -65,7 +65,7 @@ class Shape:
     values : ndarray, shape (7,)
         In the order of `NAMES`; the steepness and ratio of an exponential that is not there are zero.
     covariances : ndarray, shape (2, 7, 7)
-        By leaving out one trial at a time, and by the noise with what is known beforehand; of a steepness, of its logarithm.
+        By leaving out one trial at a time, and by the noise with the priors; of a steepness, of its logarithm.
     squares : float
         Sum of squares that is left within trials [N² m²].
     """
@@ -92,7 +92,7 @@ class Shape:
 
 
 class Problem:
-    """Moments of trials less their means, which differ from trial to trial and say nothing of the shape.
+    """Moments of trials less their means, which differ from trial to trial and do not belong to the shape.
 
     Where shared errors count, what they may do is taken out of moments and law alike: with `Z` what they do and `σ` the noise,
     `‖W r‖² = min_b ‖r − Z b‖² + σ² ‖b‖²`.
@@ -142,7 +142,7 @@ class Problem:
 
         The test of the scores of both ratios by flipping the signs of each trial's share (Hemerik, Goeman, Finos 2020), the scores freed
         from what the other numbers explain. It needs no model of the noise, and holds where trials scatter differently. An exponential that
-        is not there is asked with the expected steepness.
+        is not there is tested with the expected steepness.
         """
         values = shape.values.copy()
         absent = values[:2] == 0.0
@@ -172,7 +172,7 @@ class Problem:
         return max(squares / max(len(self.q) - self.count - 7, 1), 1e-300)
 
     def _refined(self, start: np.ndarray, variance: float, ratios: bool) -> tuple[np.ndarray, float]:
-        """Return the best values near a start and the variance that they leave; what is known beforehand counts against the start's."""
+        """Return the best values near a start and the variance that they leave; their priors are included."""
         from scipy.optimize import least_squares
 
         sd, wide = float(np.sqrt(variance)), FARTHEST if ratios else 1e-12
@@ -203,7 +203,7 @@ class Problem:
         return Shape(values, covariances, float(residual @ residual))
 
     def _covariances(self, jacobian: np.ndarray, residual: np.ndarray, variance: float, free: np.ndarray) -> np.ndarray:
-        """Return the covariances by leaving out one trial at a time, linearised, and by the noise and what is known beforehand."""
+        """Return the covariances by leaving out one trial at a time, linearised, and by the noise and the priors."""
         known = variance * np.array([0.0, 0.0, 0.0, *[STEEPNESS_STD**-2] * 2, *[RATIO_STD**-2] * 2])[free]
         scale = np.linalg.norm(jacobian, axis=0) + 1e-300
         scaled = jacobian / scale

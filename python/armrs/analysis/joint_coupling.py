@@ -12,12 +12,12 @@ from . import students_t
 from .double_exponential import NAMES, UNITS, Course, Problem, Shape, columns, derivatives
 
 LEAST_HELD = np.radians(5.0)
-"""The adjacent angle must differ by this much between configurations before a dependence on it can be told [rad]."""
+"""The adjacent angle must differ by this much between configurations before a dependence on it can be determined [rad]."""
 LEAST_SHARE = 0.005
 """Share of the moment, as root mean squares within trials, that ratios must change before the linear law is called insufficient: the
 low-pass and the bins of angles leave up to 0.004 (virtual subjects of `scripts/check_passive.py`)."""
 _SHARED = 5.0
-"""Degrees of freedom with which the scatter of all configurations speaks for that of each: its own are few."""
+"""Prior degrees of freedom with which the scatter of all configurations enters that of each: its own are few."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,10 +174,10 @@ class Coupling:
 
 
 def fit_joints(courses: Mapping[tuple[int, int], Sequence[Course]], level: float = 0.95) -> tuple[Dependence, ...]:
-    """Fit the joints, each by its courses and the adjacent joint, those left out of which nothing can be told; see `fit`.
+    """Fit the joints, each by its courses and the adjacent joint, those left out that have too few data; see `fit`.
 
     Ends of a range that move with the adjacent angle belong to an energy `exp(k (q + r a))`, and so to the moments of both joints. Where
-    each was moved while the other was held, both are asked together: twice the smaller p value (Bonferroni) is that of either. The weight
+    each was moved while the other was held, both are tested together: twice the smaller p value (Bonferroni) is that of either. The weight
     of an arm known to 5 % hides them in the shoulder, and not in the elbow.
     """
     told = {key: _Asked.of(own) for key, own in courses.items() if _enough(own)}
@@ -217,7 +217,7 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
 
 
 def _enough(courses: Sequence[Course]) -> bool:
-    """Whether courses are enough to tell a dependence on the adjacent angle."""
+    """Whether courses are enough to determine a dependence on the adjacent angle."""
     return len(courses) >= 4 and bool(np.ptp([c.adjacent for c in courses]) >= LEAST_HELD)
 
 
@@ -305,7 +305,7 @@ def _of_line(name: str, value: float, std: float, unit: str, known: tuple[float,
 def together(first: Dependence, second: Dependence) -> Coupling:
     """Return the coupling of two joints that were each moved while the other was held at different angles.
 
-    Both are weighted by variances that are estimated, which makes that of their mean look too small (Meier 1953).
+    Both are weighted by variances that are estimated, which underestimates that of their mean (Meier 1953).
     """
     stds = np.array([first.mean_coupling.std, second.mean_coupling.std])
     values = np.array([first.mean_coupling.value, second.mean_coupling.value])
@@ -349,7 +349,7 @@ def _line(x: np.ndarray, y: np.ndarray, configurations: Sequence[str]) -> _Line:
     """Fit a line to trials, of which those of one configuration scatter alike; `x` has mean zero.
 
     The variance of a configuration is that within it, together with that about the common line with the weight of `_SHARED` degrees
-    of freedom. Weights that are estimated make the variance of the slope look too small: the correction is that of Meier 1953, the
+    of freedom. Estimated weights underestimate the variance of the slope: the correction is that of Meier 1953, the
     degrees of freedom are those of Satterthwaite 1946.
     """
     _, place, counts = np.unique(np.array(configurations), return_inverse=True, return_counts=True)

@@ -103,7 +103,7 @@ def fit(values: np.ndarray, design: np.ndarray, subjects: Sequence[object]) -> M
         ratio = float(np.exp(found.x)) if found.fun < solved(0.0)[3] else 0.0
     coefficients, spread, variance, _ = solved(ratio)
     counted = len(names), n, int(np.linalg.matrix_rank(member.T @ design))
-    # With one session a subject nothing tells between from within.
+    # With one session a subject, scatter between and within subjects cannot be separated.
     between, within = (1.0, 0.0) if n == len(names) else (float(np.sqrt(ratio)), 1.0)
     deviation = float(np.sqrt(variance))
     return MixedModel(coefficients, variance * spread, between * deviation, within * deviation, *counted)

@@ -29,9 +29,9 @@ class Check:
     name : str
         `muscles silent` or `slow`.
     passed : bool or None
-        None where the data cannot tell.
+        None where the data do not show it.
     text : str
-        One sentence that says why.
+        The reason, in one sentence.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Check:
 
 
 def muscles_silent(trials: Sequence[Trial]) -> Check:
-    """Judge muscle activity that is not left out: every channel against its own median in the trial.
+    """Check muscle activity that is not left out: every channel against its own median in the trial.
 
     A contraction as long as the whole trial cannot be seen this way: that needs the activity of a known effort to compare with.
     """
@@ -71,7 +71,7 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
 
 
 def slow_enough(shares: Sequence[tuple[str, int, float]]) -> Check:
-    """Judge inertial torques: configuration, joint (from 1) and root mean square relative to the passive moment."""
+    """Check inertial torques: configuration, joint (from 1) and root mean square relative to the passive moment."""
     if not shares:
         return Check("slow", None, "No joint moved far enough to tell.")
     configuration, joint, share = max(shares, key=lambda item: item[2])

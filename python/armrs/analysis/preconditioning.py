@@ -17,7 +17,7 @@ from . import students_t
 CHANCE = 0.01
 """Probability of a loop so large by chance."""
 FEWEST = 6
-"""Cycles without which nothing is said: the later half is three."""
+"""Fewest cycles that are compared: the later half is three."""
 LEAST_MORE = 0.05
 """Share by which a loop must exceed the later ones, however alike these are."""
 _POINTS = 24

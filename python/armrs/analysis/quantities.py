@@ -1,4 +1,4 @@
-"""What a model says of the quantities that a result names: `m1*l1 + a1*m2` is 0.7012 kg m."""
+"""Values in a model of the quantities that a result names: `m1*l1 + a1*m2` is 0.7012 kg m."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Fast motion of an arm of two segments from the angles of the robot that leads it: encoders hear less noise than cameras.
+"""Fast motion of an arm of two segments from the angles of the robot that leads it: encoders have less noise than cameras.
 
-Slow motion is that of the cameras, as a handle may sit elsewhere than the markers say; what is faster than a cutoff is that of the robot:
+Slow motion is that of the cameras, as the handle may be displaced from the markers; what is faster than a cutoff is that of the robot:
 `q + (1 − LP)(q_r − LP q)`, with q_r the angles at which the hand stands where the robot holds it, less the yield of the contact.
 """
 
@@ -18,11 +18,11 @@ from ..model import Model
 _STEPS = 4
 """Steps of Newton from the measured angles to those of the robot: quadratic from some millimetres."""
 _LEAST_SINE = 0.2
-"""Of the angle between the segments, below which a hand says little of the elbow."""
+"""Of the angle between the segments, below which the hand hardly determines the elbow."""
 
 
 def with_robot_motion(trial: Trial, model: Model, cutoff: float) -> Trial | None:
-    """Return a trial whose angles above a cutoff [Hz] are those of the robot; None where the robot does not say them.
+    """Return a trial whose angles above a cutoff [Hz] are those of the robot; None where the robot does not determine them.
 
     It does for two segments, forces and angles that are measured without a gap, and an arm that is bent.
     """

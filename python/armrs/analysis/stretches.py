@@ -20,9 +20,9 @@ from . import students_t
 from .cluster_robust import deviations
 
 LONGEST = 0.2
-"""Longest latency that is asked for [s]."""
+"""Longest latency that is tried [s]."""
 FEWEST = 4
-"""Trials without which nothing is said of the scatter between them."""
+"""Fewest trials from which the scatter between them is estimated."""
 LEVEL = 0.95
 """Probability of the intervals."""
 NEEDED = 12.0
@@ -30,11 +30,11 @@ NEEDED = 12.0
 RESTING = 0.05
 """Speed below which a joint rests [rad/s]: dry friction then holds it with any torque up to its own."""
 HELD = 0.1
-"""Time for which what holds a joint at rest is taken as constant, and for which a swing is no movement [s]."""
+"""Time for which what holds a joint at rest is taken as constant, and for which an oscillation is no movement [s]."""
 ELASTIC = 5
-"""Degree of the polynomial that stands for the springs of a joint."""
+"""Degree of the polynomial that describes the springs of a joint."""
 _SLIGHT = 1e-3
-"""Size beside the largest below which what nobody knows of a trial is rounding."""
+"""Size beside the largest below which an unknown of a trial is rounding."""
 SHAPES = ("threshold", "latency", "tonic", "slope")
 UNITS = {"gain": "N m s/rad", "threshold": "rad/s", "latency": "s", "tonic": "rad", "slope": "1/s"}
 
@@ -50,19 +50,19 @@ class Stretch:
     moment : ndarray, shape (n,)
         Torque with which the joint resists [N m].
     fine_q, fine_qd : ndarray, shape (n,)
-        Angle and speed with less of a low-pass, of which thresholds are asked [rad, rad/s].
+        Angle and speed with less of a low-pass, which are compared with thresholds [rad, rad/s].
     smooth : callable
         The low-pass that angle and moment went through: what reflex and friction should show went through it too.
     coarser : callable
-        A low-pass of half the cutoff for the fine motion: what it changes stands for what the one in use may have done.
+        A low-pass of half the cutoff for the fine motion: its change is an estimate of that of the one in use.
     shared : ndarray, shape (n_errors, n)
         What errors that all sessions share, each of one standard deviation, do to the moment [N m]: of masses and of the force sensor.
     placed : ndarray, shape (n_errors, n)
         The same of errors that the trials of one session share: of markers, which are placed anew for the next.
     misread : ndarray, shape (n_errors, n)
-        What the latter do to the angle [rad], and so to the speed that the reflex is said to feel.
+        What the latter do to the angle [rad], and so to the input speed of the reflex.
     edge : int
-        Samples at each end that are not fitted: a low-pass knows one side of them only. A reflex still answers to their motion.
+        Samples at each end that are not fitted: a low-pass has one side of them only. A reflex still depends on their motion.
     """
 
     t: np.ndarray
@@ -90,7 +90,7 @@ class Stretch:
 
     @cached_property
     def unknown(self) -> np.ndarray:
-        """An orthonormal basis of what nobody knows of a trial: its offset, and what dry friction holds at rest, (n_fitted, k).
+        """An orthonormal basis of the unknowns of a trial: its offset, and what dry friction holds at rest, (n_fitted, k).
 
         That changes as the joint creeps: it has a level of its own every `HELD`.
         """
@@ -109,7 +109,7 @@ class Stretch:
         return values[self.edge : len(values) - self.edge]
 
     def told(self, values: np.ndarray) -> np.ndarray:
-        """Return the samples that are fitted, (n,) or (n, m), less what nobody knows of the trial."""
+        """Return the samples that are fitted, (n,) or (n, m), less the unknowns of the trial."""
         inner = self.inner(values)
         return np.asarray(inner - self.unknown @ (self.unknown.T @ inner))
 
@@ -144,7 +144,7 @@ class Estimated:
 
 @dataclass(frozen=True, eq=False)
 class Reflex:
-    """What the stretches of one joint say.
+    """Result of the stretches of one joint.
 
     Attributes
     ----------

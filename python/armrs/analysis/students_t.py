@@ -1,4 +1,4 @@
-"""Student's t: intervals and probabilities of what few repeats tell."""
+"""Student's t: intervals and probabilities from few repeats."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def angle_errors(model: Model, q: np.ndarray, deviations: Deviations, *, markers
 def placements(
     model: Model, q: np.ndarray, force: np.ndarray | None, deviations: Deviations, declared: np.ndarray, spring: tuple[int, float]
 ) -> np.ndarray:
-    """Return what misplaced markers do to the moment of a joint at the angles that they tell, shape (4 n_joints, n) [N m].
+    """Return the effect of misplaced markers on the moment of a joint at the angles from them, shape (4 n_joints, n) [N m].
 
     Lengths and angles follow from markers. A misread angle also moves the moment to another angle, by the slope of the moment.
 

@@ -48,7 +48,7 @@ class Estimate:
 
     @property
     def most(self) -> float:
-        """Largest error that this estimate stands for: that of a coupling of first order, of which it is two thirds."""
+        """Largest error at this estimate: that of a coupling of first order, of which it is two thirds."""
         return self.error if self.at is not None else 1.5 * self.error
 
     @property
@@ -68,9 +68,9 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
     The second run has half the steps inside of arms, too; steps that an FMU makes inside are its own affair.
     The error of every output that is connected, and of the angles of every arm, is estimated as 4/3 of the difference between the two
     runs. In the second run slaves make each step in parts no longer than the resolution of the system, so that a pulse of a partner
-    between the communication points is seen. What a jump within a communication step does to the others, this does not tell: such a run
+    between the communication points is seen. The effect of a jump within a communication step on the others is not estimated: such a run
     is stable. Where an error is too large or not known, and the system allows it, the run itself is made again with half the step, and
-    judged in the same way.
+    treated in the same way.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
     Returns
     -------
     Coupled
-        The run with the verdict "good", "ended" where a slave asked to end it, or "stable" where its error cannot be estimated, which a
-        warning says.
+        The run with the verdict "good", "ended" where a slave requested its end, or "stable" where its error cannot be estimated, which
+        a warning states.
 
     Raises
     ------
@@ -180,7 +180,7 @@ def _large_jumps(run: Coupled, finer: Coupled) -> Iterator[tuple[str, str, list[
 
 
 def _computed_late(run: Coupled, finer: Coupled) -> list[str]:
-    """Say which outputs jump where their slaves begin: the first step is made with values that no step computed."""
+    """Return which outputs jump where their slaves begin: the first step is made with values that no step computed."""
     first = (finer.resolution or 0.0) * (1.0 + 1e-9)
     late = [
         (name, f"{jump.size:.3g} {unit}".strip()) for name, unit, large in _large_jumps(run, finer) for jump in large if jump.time <= first
@@ -192,7 +192,7 @@ def _computed_late(run: Coupled, finer: Coupled) -> list[str]:
 
 
 def _jumps(run: Coupled, finer: Coupled) -> str:
-    """Return which output has jumps whose effect on the others two runs cannot tell."""
+    """Return which output has jumps whose effect on the others cannot be estimated by two runs."""
     accuracy, resolution = run.system.accuracy, finer.resolution or 0.0
     for name, unit, large in _large_jumps(run, finer):
         for jump in large:
@@ -232,7 +232,7 @@ def _differs_at_the_start(run: Coupled, again: Coupled) -> str:
 
 
 def _looked(run: Coupled) -> str:
-    """Say which events were not looked for."""
+    """Return which events were not searched for."""
     return f"; an event of a partner shorter than {1e3 * run.resolution:.3g} ms can be missed" if run.resolution else ""
 
 

@@ -28,7 +28,7 @@ class Jump:
     size : float
     at_point : bool
         Whether a communication point of the first run is at either end of this part, so that the jump may be there. One just after such a
-        point delays what the others get by less than a step, and by half of that in the second run: two runs tell its effect.
+        point delays what the others get by less than a step, and by half of that in the second run: two runs give its effect.
     """
 
     time: float
@@ -71,7 +71,7 @@ class Between:
     count : int
         Number of outputs.
     resolution : float
-        Longest time between two looks [s]; infinite for none between the communication points.
+        Longest time between two readings [s]; infinite for none between the communication points.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Between:
     jumps : list of list of Jump
         Jumps of each output.
     longest : float
-        Longest time between two looks in fact [s].
+        Actual longest time between two readings [s].
     """
 
     def __init__(self, out_of: Sequence[np.ndarray], driven: Sequence[bool], count: int, resolution: float) -> None:
@@ -133,7 +133,7 @@ class Between:
         self._is_second = not self._is_second
 
     def close(self) -> None:
-        """Look for jumps in what was seen in several steps."""
+        """Search for jumps in the readings of several steps."""
         for i, series in self._series.items():
             found = outliers(np.diff([row for _, row, _ in series], axis=0))
             at_point = [before or after for (_, _, before), (_, _, after) in pairwise(series)]

@@ -50,7 +50,7 @@ class Coupled(Tabular, Series):
     ----------
     system : System
     verdict : {"stable", "good", "ended", "unstable", "not resolved", "not accurate", "diverged", "failed", "not converged"}
-        "stable" where the error was not estimated, "good" where it is within the accuracy, "ended" where a slave asked to end the run.
+        "stable" where the error was not estimated, "good" where it is within the accuracy, "ended" where a slave ended the run.
         The others are no results.
     why : str
         One line on the verdict.
@@ -71,7 +71,7 @@ class Coupled(Tabular, Series):
     jumps : dict of str to list of Jump
         Jumps of connected outputs, of those alone that do.
     resolution : float, optional
-        Longest time for which no slave was looked at [s]; a shorter event may not be seen. None where the error was not estimated.
+        Longest time without a reading of the slaves [s]; a shorter event may not be seen. None where the error was not estimated.
     estimates : tuple of `armrs.cosim.accuracy.Estimate`
         Estimated errors; empty where they were not estimated.
     """

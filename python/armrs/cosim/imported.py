@@ -77,7 +77,7 @@ class _Plan:
 class ImportedSlave(Partner):
     """An FMU for co-simulation, FMI 2.0 or 3.0, from any tool, loaded into this process.
 
-    It runs the native code of the FMU with the rights of this process, and dies with it; `IsolatedSlave` has it in a process of its
+    It runs the native code of the FMU with the rights of this process, and a crash ends both; `IsolatedSlave` has it in a process of its
     own. It is unpacked into a temporary folder that `free` removes.
 
     Parameters
@@ -87,7 +87,7 @@ class ImportedSlave(Partner):
     name : str, optional
         Name of the instance.
     logging : bool
-        Whether the FMU is asked to log what it does.
+        Whether logging of the FMU is switched on.
     folder : Path, optional
         Where it is unpacked already; it stays there.
     **mode
@@ -130,7 +130,7 @@ class ImportedSlave(Partner):
             if remove is not None:
                 shutil.rmtree(remove, ignore_errors=True)
             raise
-        self._mode = mode  # callbacks live as long as the instance
+        self._mode = mode  # callbacks must exist as long as the instance
         self._instance = c_void_p(handle)
         self._plans: dict[tuple[str, ...], _Plan] = {}
         self._flags = [c_bool() for _ in range(3)]
@@ -229,7 +229,7 @@ class ImportedSlave(Partner):
             if status == 0:
                 return StepResult(Status.OK, time + step)
             event = early = False
-            # A slave of FMI 2.0 that wants to end discards the step and says so when it is asked.
+            # A slave of FMI 2.0 that requests the end discards the step, and returns the request when queried.
             terminate = status == Status.DISCARD and self._terminated()
             reached = time + step if status == Status.WARNING else self._reached(time)
         if not 0 <= status <= Status.DISCARD:

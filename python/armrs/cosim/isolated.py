@@ -40,7 +40,7 @@ class IsolatedSlave(Partner):
     name : str, optional
         Name of the instance.
     logging : bool
-        Whether the FMU is asked to log what it does.
+        Whether logging of the FMU is switched on.
     seconds : float
         Longest time of one call [s].
 

@@ -25,7 +25,7 @@ C_TYPES: dict[str, Any] = {
 NAMES_IN_2 = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean", "String": "String"}
 
 _LOG_3 = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
-# The sixth argument is the first after the format: what "%s" stands for.
+# The sixth argument is the first after the format: the value of "%s".
 _LOG_2 = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_void_p)
 UPDATE_3 = ctypes.CFUNCTYPE(None, c_void_p, c_double, c_bool, c_bool, c_bool, c_bool, ctypes.POINTER(c_bool), ctypes.POINTER(c_double))
 """Intermediate update of FMI 3.0."""
@@ -153,7 +153,7 @@ class Library:
 
 
 def _folder(resources: Path | None) -> c_char_p:
-    # The standard wants a separator at the end.
+    # The standard requires a separator at the end.
     return c_char_p(None if resources is None else os.fsencode(f"{resources}{os.sep}"))
 
 

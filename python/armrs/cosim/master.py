@@ -1,4 +1,4 @@
-"""The master: steps the slaves of a system together, and says whether what comes out may be believed."""
+"""The master: steps the slaves of a system together, and estimates the error of the result."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WORTH_A_WARNING = 0.005
 """Share of the energy that went through, above which a coupling that stays stable has a warning."""
 _PORT_INPUTS = ("handle.F[", "robot.v[")
 _LITTLE = 1e-6
-"""Energy below which a share says nothing [J]."""
+"""Energy below which a share is meaningless [J]."""
 _ITERATIONS = 25
 """Most steps with one Jacobian at a communication point, which each step corrects."""
 LITTLE = 1e-3
@@ -52,13 +52,13 @@ def run_system(system: System, *, resolution: float = np.inf, progress: Callable
         When the run is no result: it diverged, the coupling creates energy, or the iteration did not converge. Its attribute `run` is the
         run as far as it went, for diagnosis.
     BadInput
-        When the algorithm asks for what a slave cannot do.
+        When the algorithm needs a feature that a slave does not have.
     SlaveError
         When a slave refuses a call.
     """
     run = _Run(system, resolution)
     run.initialize()
-    # Numbers beyond all bounds are looked for, and said in words.
+    # Numbers beyond all bounds are searched for, and reported in words.
     with np.errstate(all="ignore"):
         run.steps(progress)
         result = run.result()
@@ -74,7 +74,7 @@ class _Failed(Exception):
 
 
 class _Ended(Exception):
-    """A slave asked to end the run; the step was made as far as it goes."""
+    """A slave requested the end of the run; the step was made as far as it goes."""
 
 
 class _Run:
@@ -191,7 +191,7 @@ class _Run:
             self.stopped = ("failed", f"after the last step: {error}")
 
     def _step(self, begin: float, end: float) -> None:
-        """Make a step, or say why it cannot be made."""
+        """Make a step, or raise why it cannot be made."""
         make = {"jacobi": self._jacobi, "gauss-seidel": self._gauss_seidel, "iterated": self._iterated}[self.system.algorithm]
         try:
             used = make(begin, end - begin)
@@ -274,7 +274,7 @@ class _Run:
         fresh = True
 
         def residual(guess: np.ndarray) -> np.ndarray:
-            """Make the step with a guess of what comes back at its end, and return what came back less the guess."""
+            """Make the step with assumed inputs at its end, and return the inputs that result less the assumed ones."""
             nonlocal fresh
             if not fresh:
                 for i, state in zip(loop, states, strict=True):
@@ -442,13 +442,13 @@ class _Run:
             return "stable", why, [why] if self.system.connections else []
         warnings = []
         for i in dict.fromkeys(self.target[self.dual_of].tolist()):
-            # What enters one slave is judged together: y and z of one handle.
+            # Inputs of one slave are checked together: y and z of one handle.
             places = [k for k in self.dual_of if self.target[k] == i]
             made, went = (np.nansum(energy[:, places], axis=1) for energy in (created, exchanged))
             most, through = float(np.max(np.abs(made))), max(float(np.max(np.abs(went))), _LITTLE)
             steps_made, steps_went = (float(np.sum(np.abs(np.diff(energy)))) for energy in (made, went))
             text = f"the coupling creates {most:.3g} J at {self.slaves[i].name}, where {through:.3g} J are transferred"
-            # A coupling far beyond its limit throws energy about in both directions: then the sum over steps tells.
+            # A coupling far beyond its limit has energy errors of both signs: then the sum of their sizes over steps counts.
             if most > MOST_CREATED * through or steps_made > MOST_IN_STEPS * max(steps_went, _LITTLE):
                 return "unstable", f"{text}; take {self._stabler(i)}", []
             if most > WORTH_A_WARNING * through:
@@ -456,7 +456,7 @@ class _Run:
             inside = self._received(i, outputs)
             if inside is None:
                 continue
-            # The arm knows what it received between the communication points, whatever was held there.
+            # The arm integrates what it received between the communication points, at any hold.
             places = [k for k in places if self._input(k).startswith(_PORT_INPUTS)]
             went = np.nansum(exchanged[:, places], axis=1)
             off, through = float(np.max(np.abs(inside - went))), max(float(np.max(np.abs(inside))), _LITTLE)
@@ -469,7 +469,7 @@ class _Run:
         return "stable", "the energy that the coupling creates is small", warnings
 
     def _stabler(self, i: int) -> str:
-        """Say what may keep the coupling at a slave from creating energy, of what the partners can do."""
+        """Return remedies against energy created by the coupling at a slave, of those that the partners support."""
         found = ["a shorter step"]
         iterating = [self.slaves[k] for k in range(len(self.slaves))[self._loop]] if len(self.torn) else []
         stuck = [slave.name for slave in iterating if not slave.can_rollback]

@@ -37,9 +37,9 @@ class StepResult:
     last_successful_time : float
         Up to when the slave came [s].
     event, terminate, early_return : bool
-        What the slave asks for, as in FMI 3.0.
+        What the slave requires, as in FMI 3.0.
     message : str
-        What it says of a discarded step.
+        Its message on a discarded step.
     """
 
     status: Status
@@ -114,7 +114,7 @@ class Variable:
 class Partner(abc.ABC):
     """A slave, wherever it runs.
 
-    Calls that are not done raise `SlaveError`; a step that is discarded says so in its result.
+    Calls that are not done raise `SlaveError`; a discarded step is marked in its result.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ class Partner(abc.ABC):
     def set_state(self, state: Any) -> None:
         """Come back to a state."""
 
-    def free_state(self, state: Any) -> None:  # noqa: B027 (only what lives outside Python has anything to free)
+    def free_state(self, state: Any) -> None:  # noqa: B027 (only resources outside Python have to be freed)
         """Give a state back that is not needed any more."""
 
     @abc.abstractmethod

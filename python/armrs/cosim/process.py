@@ -1,4 +1,4 @@
-"""A process of its own for foreign code, spoken to over a pipe of its own: lines of JSON that begin with a word no one else knows."""
+"""A separate process for foreign code, with a separate pipe: lines of JSON that begin with a secret word."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Confined:
         Raises
         ------
         ProcessEnded
-            When the process ends, or says nothing for the given time.
+            When the process ends, or sends nothing for the given time.
         """
         self._deadline = time.monotonic() + seconds
         try:
@@ -136,7 +136,7 @@ class Confined:
             raise self._gone(0.0) from None
 
     def _gone(self, seconds: float) -> ProcessEnded:
-        """Say how the process ended; the rest of its group is ended too."""
+        """Return how the process ended; the rest of its group is ended too."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_ENDED_WITHIN)
         how = self._ended

@@ -371,7 +371,7 @@ def _number(element: ElementTree.Element, key: str, normal: float | None) -> flo
 
 
 def _xml(path: Path, prefix: str, tag: str) -> ElementTree.Element:
-    """Read an XML file and refuse any other than the one that is wanted."""
+    """Read an XML file and refuse any other than the expected one."""
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -140,7 +140,7 @@ def _connection(parent: ElementTree.Element, connection: Connection, system: Sys
         ends |= {f"{key}Element": name, f"{key}Connector": variable}
     line = _element(parent, "ssd:Connection", **ends)
     output, given = (system.slaves[name].variables[variable] for name, variable in (connection.source, connection.target))
-    # Units are converted by whoever reads the file, from the connectors.
+    # Units are converted by the reader of the file, from the connectors.
     factor = connection.factor * given.scale / output.scale
     if (factor, connection.offset) != (1.0, 0.0):
         _element(line, "ssc:LinearTransformation", factor=repr(factor), offset=repr(connection.offset))

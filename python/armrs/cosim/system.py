@@ -27,7 +27,7 @@ KINDS = ("model", "fmu", "wall", "signal", "pid", "impedance")
 WITHIN = ("start", "mean", "end")
 _OPTIONAL = ("algorithm", "tolerance", "accuracy", "refine", "resolution_s", "shortest_step_s")
 RESOLUTION = 0.25e-3
-"""Shortest event of a partner that a good run must not miss, where nothing is said [s]: the inner step of arms."""
+"""Default of the shortest event of a partner that a good run must not miss [s]: the inner step of arms."""
 _POWER = (1, 2, -3)
 _MOST_STEPS = 10_000_000
 """Most communication steps of a run: every one of them is kept."""
@@ -401,7 +401,7 @@ def parted(text: str, slaves: Iterable[str]) -> tuple[str, str]:
 
 
 def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str, str]]:
-    """Return the variables that a name stands for: itself, or all of its indices."""
+    """Return the variables of a name: itself, or all of its indices."""
     text = checks.text(key, value)
     name, variable = parted(text, slaves)
     if name not in slaves:
@@ -416,7 +416,7 @@ def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str
 
 
 def _within(target: tuple[str, str], variable: Variable, slaves: dict[str, Partner]) -> str:
-    """Return which value of an output an input takes, where nothing is said."""
+    """Return which value of an output an input takes by default."""
     if target[1].startswith(("robot.r[", "robot.v[")) and "contact.F[1]" in slaves[target[0]].variables:
         # The motion port goes on from the start by itself, best with the mean velocity.
         return "start" if target[1].startswith("robot.r[") else "mean"
@@ -426,7 +426,7 @@ def _within(target: tuple[str, str], variable: Variable, slaves: dict[str, Partn
 
 
 def _dual(given: object, target: tuple[str, str], slaves: dict[str, Partner]) -> tuple[str | None, float]:
-    """Return what makes a power with an input, for the ports of an arm without being told."""
+    """Return what makes a power with an input; known for the ports of an arm."""
     known = slaves[target[0]].variables
     own: tuple[str | None, float] = (None, 1.0)
     for stem, dual, sign in (("handle.F", "handle.v", 1.0), ("robot.v", "contact.F", -1.0)):

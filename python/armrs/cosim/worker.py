@@ -18,7 +18,7 @@ from .process import Channel
 
 
 def main() -> None:
-    """Restrict this process, and do what the first message asks for."""
+    """Restrict this process, and do the task of the first message."""
     channel = Channel()
     life = int(sys.argv[1])
     if life >= 0:

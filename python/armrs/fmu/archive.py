@@ -22,7 +22,7 @@ MOST_BYTES = 1 << 30
 MOST_FILES = 100_000
 _PIECE = 1 << 20
 _MOST_SAID = 200
-"""Letters of what the parser says, which may repeat what it read."""
+"""Letters of the parser's message, which may repeat what it read."""
 
 
 @contextmanager

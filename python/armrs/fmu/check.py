@@ -1,4 +1,4 @@
-"""Checking an FMU: what the file promises against the standard, and what the library does against what the file promises."""
+"""Checking an FMU: the description against the standard, and the library against the description."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _schemas(files: zipfile.ZipFile, content: bytes, path: str | os.PathLike[str
     head = content[: content.find(b">", content.find(b"<fmiModelDescription")) + 1]
     version = re.search(rb"""fmiVersion\s*=\s*["']\s*(\d+)""", head)
     if version and version[1] not in (b"2", b"3"):
-        # It is refused for its version; the schema of another one has nothing to say.
+        # It is refused for its version; the schema of another one does not apply.
         return
     fmi = int(version[1]) if version else 3
     for name in sorted({name for _, name in schema.SCHEMAS} & set(files.namelist())):

@@ -56,12 +56,12 @@ class Clock:
 
     @property
     def asked(self) -> bool:
-        """Whether the library alone knows the interval."""
+        """Whether only the library has the interval."""
         return self.kind in ("changing", "countdown") or (self.kind in _PERIODIC and self.interval is None)
 
 
 def clocks(description: Description) -> list[Clock]:
-    """Return the clocks of a description; what a variable does not say its declared type may."""
+    """Return the clocks of a description; attributes that a variable lacks may be in its declared type."""
     types = {t.get("name"): t for t in description.root.iterfind("TypeDefinitions/ClockType")}
     found = []
     for element in description.root.iterfind("ModelVariables/Clock"):
@@ -113,7 +113,7 @@ def broken(description: Description) -> Iterator[Broken]:
 
 
 def intervals(trial: Trial, call: Call, when: str, kinds: tuple[str, ...] = (*_PERIODIC, "changing", "countdown")) -> dict[str, float]:
-    """Ask for the intervals that the library alone knows; return those that it has."""
+    """Query the intervals that only the library has; return them."""
     found = {}
     for clock in clocks(trial.description):
         if clock.kind not in kinds or not clock.asked:
@@ -132,7 +132,7 @@ def intervals(trial: Trial, call: Call, when: str, kinds: tuple[str, ...] = (*_P
 
 
 def tick(trial: Trial, call: Call) -> None:
-    """Activate, in the event mode at the start, the clocks that tick then, and ask which clocks of the FMU do."""
+    """Activate, in the event mode at the start, the clocks that tick then, and query which clocks of the FMU do."""
     for clock in clocks(trial.description):
         if clock.causality == "input" and (clock.kind == "triggered" or (clock.kind in _PERIODIC and clock.interval and not clock.shift)):
             call("SetClock", _references(clock), c_size_t(1), byref(c_bool(True)))
@@ -140,7 +140,7 @@ def tick(trial: Trial, call: Call) -> None:
 
 
 def ticking(trial: Trial, call: Call) -> None:
-    """Ask which clocks of the FMU tick."""
+    """Query which clocks of the FMU tick."""
     for clock in clocks(trial.description):
         if clock.causality == "output":
             call("GetClock", _references(clock), c_size_t(1), byref(c_bool()))

@@ -24,7 +24,7 @@ _TYPES_OF_2 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Str
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit: powers of kg, m, s and rad, or None when the file does not say, and the factor to base units."""
+    """A unit: powers of kg, m, s and rad, or None when the file does not state them, and the factor to base units."""
 
     name: str
     exponents: tuple[int, ...] | None
@@ -42,7 +42,7 @@ class Unknown:
     name : str
         The variable; "?" for one that does not exist.
     dependencies : tuple of str, optional
-        Variables that it depends on; None where nothing is said, which means all.
+        Variables that it depends on; None where none are listed, which means all.
     kinds : tuple of str, optional
         One kind of dependency for each.
     """
@@ -55,7 +55,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Description:
-    """What `modelDescription.xml` says.
+    """Contents of `modelDescription.xml`.
 
     Attributes
     ----------
@@ -243,7 +243,7 @@ def _variable(
 
 
 def _variability(element: ElementTree.Element, *, floating: bool, is_two: bool) -> str:
-    """Return what the standards take where nothing is said."""
+    """Return the default of the standards."""
     if is_two:
         return "continuous"
     if element.get("causality") in ("parameter", "calculatedParameter", "structuralParameter"):

@@ -1,4 +1,4 @@
-"""What an FMU says of itself, as plain data and in words."""
+"""The description of an FMU, as plain data and in words."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NUMBERS = ("maxOutputDerivativeOrder", "fixedInternalStepSize", "recommendedInt
 
 
 def about(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return what an FMU says of itself, as it is written to JSON."""
+    """Return the description of an FMU, as it is written to JSON."""
     description = read_description(path)
     with archive(path) as files:
         platforms = sorted({name.split("/")[1] for name in files.namelist() if name.startswith("binaries/") and name.count("/") > 1})

@@ -29,7 +29,7 @@ class _Watch:
     readable, settable : list of Variable
         Variables that the instance was made to give and to take meanwhile.
     early : bool
-        Whether the instance was allowed to return early; then it is asked to, as soon as it can.
+        Whether the instance was allowed to return early; then it has to, as soon as it can.
     """
 
     trial: Trial
@@ -115,7 +115,7 @@ def _without(trial: Trial) -> dict[str, list[Any]]:
 
 
 def early_return(trial: Trial) -> None:
-    """Make an instance that may return early where that is promised, ask it to where it can, and go on from where it came to."""
+    """Make an instance that may return early if it declares so, request that where it can, and continue from there."""
     if trial.fmi == 2 or trial.wants_events or not (trial.flag(_EARLY) or trial.flag(_ON_REQUEST)):
         return
     trial.step("creating an instance that may return early")

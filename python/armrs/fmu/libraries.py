@@ -112,7 +112,7 @@ def collected(fmi: int, folder: str | os.PathLike[str] | None) -> tuple[dict[tup
 
 
 def _platform(name: str) -> Platform:
-    """Return a kind of machine; of one for which only the package was built, nothing tells its files."""
+    """Return a kind of machine; of one for which only the package was built, its files are not recognised."""
     return PLATFORMS.get(name, Platform(_OTHERS_OF_2.get(name), "", platform_folder(3)[1], b"", b""))
 
 
@@ -140,7 +140,7 @@ def _checked(path: Path, name: str) -> bytes:
     if path.stat().st_size > _MOST_BYTES:
         raise BadInput("library", Text(f"{path.stat().st_size} bytes"), f"at most {_MOST_BYTES}", file=path)
     content = path.read_bytes()
-    # A program of Windows begins with one of DOS, which says where the other is.
+    # A program of Windows begins with one of DOS, with the offset of the other.
     at = int.from_bytes(content[60:64], "little") + 4 if platform.magic == b"MZ" else 4 if platform.magic == _MACH else 18
     if not content.startswith(platform.magic) or content[at : at + len(platform.machine)] != platform.machine:
         raise BadInput("library", Text("a file for another machine"), f"a library for {name}", file=path)

@@ -1,4 +1,4 @@
-"""The library of an FMU, tried: what it does against what its description promises. It runs in a process of its own."""
+"""The library of an FMU, tried: its behaviour against its description. It runs in a process of its own."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def parts(description: Description) -> list[int | None]:
 
 
 def _guarded(trial: Trial, promise: Callable[[Trial], None]) -> None:
-    """Keep one broken promise from hiding the others."""
+    """Keep one failure from hiding the others."""
     try:
         promise(trial)
     except ArmrsError as refused:
@@ -50,7 +50,7 @@ def _guarded(trial: Trial, promise: Callable[[Trial], None]) -> None:
 
 
 def _symbols(trial: Trial) -> bool:
-    """Load the libraries, of which each interface may have one of its own, and look for the functions of the standard in them."""
+    """Load the libraries, of which each interface may have one of its own, and find the functions of the standard in them."""
     interfaces: dict[str, list[str]] = {}
     for kind, attributes in trial.description.interfaces.items():
         interfaces.setdefault(attributes.get("modelIdentifier", ""), []).append(kind)
@@ -113,7 +113,7 @@ def _life(trial: Trial) -> None:
 
 
 def _made_with_events(trial: Trial) -> bool:
-    """Whether an instance that uses the event mode is made; FMUs with clocks may want it."""
+    """Whether an instance that uses the event mode is made; FMUs with clocks may need it."""
     try:
         trial.make(event_mode=True).free()
     except SlaveError:
@@ -193,7 +193,7 @@ def _advance(trial: Trial, slave: ImportedSlave, time: float, size: float) -> di
 
 
 def _time(trial: Trial, slave: ImportedSlave, end: float) -> None:
-    """Compare the independent variable with the time of the importer; FMI 2.0 cannot say which inner step it may lag behind by."""
+    """Compare the independent variable with the time of the importer; FMI 2.0 cannot state by which inner step it may lag."""
     for v in trial.readable("independent") if trial.fmi == 3 else []:
         found = float(slave.values(v.name)[0])
         if not abs(found - end) <= 1e-9 * max(1.0, abs(end)) + trial.lag:

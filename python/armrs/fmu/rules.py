@@ -180,7 +180,7 @@ def _attributes(description: Description) -> Iterator[Broken]:
 
 
 def worth_knowing(description: Description) -> Iterator[Broken]:
-    """Give what is no error, and not what the standard has either: attributes that no importer knows."""
+    """Give what is no error, and not what the standard has either: attributes that are not in the standard."""
     if not description.token and _token(description) in description.root.attrib:
         yield _token(description), "empty: nothing ties the description to the library"
     known = names.CO_SIMULATION[description.fmi]

@@ -26,7 +26,7 @@ def available() -> bool:
 
 
 def violations(fmi: int, name: str, content: bytes) -> Iterator[str]:
-    """Give what the schema of a file says against it, each with its line; nothing for a file that has no schema."""
+    """Give the violations of its schema by a file, each with its line; nothing for a file that has no schema."""
     if (fmi, name) not in SCHEMAS:
         return
     from lxml import etree

@@ -45,7 +45,7 @@ def _outputs(description: Description) -> Iterator[Broken]:
 
 
 def _derivatives(description: Description, variables: dict[str, Variable]) -> Iterator[Broken]:
-    """Every derivative that is listed says of what."""
+    """Every derivative that is listed states of what."""
     elements = description.root.iterfind("ModelVariables/*")
     named = {e.get("name"): e.find("Real") if description.fmi == 2 else e for e in elements}
     for unknown in description.unknowns("ContinuousStateDerivative"):

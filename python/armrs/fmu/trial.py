@@ -50,7 +50,7 @@ class Trial:
     needs_tool: bool = False
 
     def step(self, what: str) -> None:
-        """Say what comes next, for the case that it crashes."""
+        """Announce the next step, for the case that it crashes."""
         self.send({"step": what})
 
     def find(self, place: str, text: str, *, level: str = "error", sort: str = "") -> None:

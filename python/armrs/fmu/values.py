@@ -37,7 +37,7 @@ def _given(v: Variable) -> Any:
 
 
 def starts(trial: Trial, slave: ImportedSlave) -> None:
-    """Compare what the library holds with what the description says."""
+    """Compare the values in the library with those of the description."""
     exact = [v for v in trial.readable() if v.start is not None and v.causality != "independent" and _initial_of(v) == "exact"]
     for v in exact:
         try:
@@ -73,7 +73,7 @@ def reads(trial: Trial, slave: ImportedSlave) -> None:
 
 
 def _initial_of(v: Variable) -> str:
-    """Return where a start value comes from, with what the standards take where nothing is said."""
+    """Return where a start value comes from, with the default of the standards."""
     if v.initial is not None:
         return v.initial
     exact = v.causality in ("input", "parameter", "structuralParameter") or v.variability == "constant"

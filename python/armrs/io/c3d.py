@@ -33,7 +33,7 @@ class C3D:
     rate : float
         Frames a second [Hz].
     y_screen : str
-        Axis that points up on the screen of the program that wrote it, such as `+Z`; empty where it does not say.
+        Axis that points up on the screen of the program that wrote it, such as `+Z`; empty where it is not stated.
     analog_labels, analog_units : list of str
         Of the analog channels (force plates, EMG).
     analog : ndarray, shape (n_samples, n_channels)
@@ -92,7 +92,7 @@ def _checked(content: Any) -> C3D:
 
 
 def _check_header(path: Path) -> None:
-    """Refuse a file that is no C3D, or shorter than its header says, before a reader trusts its counts."""
+    """Refuse a file that is no C3D, or shorter than by its header, before a reader uses its counts."""
     try:
         with path.open("rb") as stream:
             head = stream.read(_BLOCK)

@@ -50,7 +50,7 @@ class Dataset(Framed, Series):
     trials : tuple of Trial
         In the order of the file, those without a single sample left out.
     force_on : {"robot", "arm"} or None
-        What the forces in the files act on. In the trials they are forces on the arm, whatever this says.
+        What the forces in the files act on. In the trials they are always forces on the arm.
     sample_rate : float or None
         As stated [Hz].
     subject : Subject
@@ -60,13 +60,13 @@ class Dataset(Framed, Series):
     model_path : Path or None
         Where the model was read.
     warnings : tuple of str
-        What the user should know, one line each.
+        Remarks for the user, one line each.
     synthetic : bool
-        Whether the trials were simulated; reports say so.
+        Whether the trials were simulated; reports state it.
     added : tuple of AddedMass
         Masses that are worn in some configurations besides the model.
     muscles : tuple of Muscle
-        Whose activity the channels tell.
+        The muscles of the activity channels.
     """
 
     name: str
@@ -184,7 +184,7 @@ class Dataset(Framed, Series):
 def refuse_other_arms(dataset: Dataset) -> None:
     """Refuse arms that nothing identifies: with masses worn in some configurations, which would be ignored, or of too many segments.
 
-    The core refuses long arms as well, but only after the samples were looked at, which takes long for them.
+    The core refuses long arms as well, but only after reading the samples, which takes long for them.
     """
     if dataset.model.n_joints > _MOST_SEGMENTS:
         allowed = f"1 to {_MOST_SEGMENTS} segments; only kernels, passive moments and co-simulation take more"
@@ -342,7 +342,7 @@ def naming_trials(trials: Sequence[Trial]) -> Iterator[None]:
 
 
 def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
-    """Return the path of a `dataset.toml` and what it says."""
+    """Return the path of a `dataset.toml` and its contents."""
     path = checks.path("source", source)
     if not os.path.lexists(path):
         raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)

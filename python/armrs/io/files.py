@@ -20,12 +20,12 @@ PathLike = str | os.PathLike[str]
 
 _HOST = re.sub(r"\W", "_", os.uname().nodename if hasattr(os, "uname") else os.environ.get("COMPUTERNAME", ""))[:32] or "host"
 _UNFINISHED = re.compile(r"\..*\.(?P<host>\w+)-(?P<process>\d+)\..*\.part")
-"""Names of what a process has not finished writing: it says which process of which machine."""
+"""Names of unfinished files of a process: they hold process and machine."""
 _GENERATOR = re.compile(rb'<meta name="generator" content="armrs ([a-z -]+)">')
 _NUMBERED = re.compile(r"(.+-)\d+(\.\w+)")
 """Names of files that a result has several of, such as `movement-1.toml`."""
 _HEAD = 2000
-"""Bytes of a page in which it says what made it."""
+"""Bytes of a page that contain its maker."""
 _COMPLETE = ".complete"
 """Suffix of a folder whose files are all written and on their way to their places."""
 _SCRATCH = re.compile(r"armrs-.*?(?P<host>\w+)-(?P<process>\d+)-.*")
@@ -95,7 +95,7 @@ def unnamed(near: PathLike | None) -> Iterator[IO[bytes]]:
     try:
         yield file
     finally:
-        # What could not be written was said before.
+        # A write error was reported before.
         with suppress(OSError):
             file.close()
 
@@ -203,7 +203,7 @@ def recover(folder: Path) -> None:
 
 
 def scratch_prefix(what: str) -> str:
-    """Return the beginning of the name of a temporary folder; it says whose it is, so that `sweep_scratch` can remove it later."""
+    """Return the beginning of the name of a temporary folder; it holds the owner, so that `sweep_scratch` can remove it later."""
     return f"armrs-{what}-{_HOST}-{os.getpid()}-"
 
 
@@ -220,7 +220,7 @@ def _unfinished(name: str) -> str:
 
 
 def _at_work(name: str, pattern: re.Pattern[str]) -> bool:
-    """Whether the process that a name tells is still there; one on another machine may be."""
+    """Whether the process in a name is still there; one on another machine may be."""
     match = pattern.fullmatch(name)
     if match is None or match["host"] != _HOST:
         return True
@@ -261,7 +261,7 @@ def _outdated(temporary: Path, target: Path, page: Path, written: list[Path]) ->
 
 
 def _maker(path: Path) -> str | None:
-    """Return the verb that a page says it was made by."""
+    """Return the verb that made a page, as stated in it."""
     with path.open("rb") as page:
         match = _GENERATOR.search(page.read(_HEAD))
     return match[1].decode("ascii") if match else None
@@ -329,7 +329,7 @@ def json_text(data: Any) -> str:
 
 
 def may_replace(path: PathLike, kind: str) -> None:
-    """Refuse to replace a folder, and a file whose suffix says that it is of another kind than `kind`."""
+    """Refuse to replace a folder, and a file whose suffix is of another kind than `kind`."""
     target = Path(path)
     if target.is_dir():
         raise BadInput("file", Text("a folder"), "the name of a file", file=path)

@@ -14,7 +14,7 @@ _SHOWN = 40
 
 
 def read(path: str | os.PathLike[str], what: str = "a JSON file") -> Any:
-    """Return what a JSON file says; `what` is the file that is wanted, in words.
+    """Return the contents of a JSON file; `what` is the expected file, in words.
 
     Raises
     ------

@@ -42,9 +42,9 @@ class Markers:
     positions : ndarray, shape (n, len(names), 3)
         [m]; NaN where a marker was not seen.
     up : str
-        Axis that points up where nothing else is said: `x`, `y`, `z`.
+        Default of the axis that points up: `x`, `y`, `z`.
     warnings: tuple of str
-        What the reader has to tell the user.
+        Remarks of the reader.
     """
 
     names: list[str]
@@ -159,7 +159,7 @@ class PlanarMotion:
         }
 
     def warnings(self) -> list[str]:
-        """Return what the user should know, one line each."""
+        """Return remarks for the user, one line each."""
         lines = []
         if not self.is_planar:
             angle = f"{np.degrees(self.out_of_plane):.3g}° (rms) and up to {np.degrees(self.out_of_plane_most):.3g}°"

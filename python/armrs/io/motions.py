@@ -72,7 +72,7 @@ def convert_markers(
         The file written: `t_s` and `q1_rad` …, with empty cells where a marker is missing.
     PlanarMotion
     tuple of str
-        What the reader has to tell.
+        Remarks of the reader.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Muscle activity: samples at which a muscle is more active than at rest say nothing of the passive arm, and are marked.
+"""Muscle activity: samples at which a muscle is more active than at rest are not those of a passive arm, and are marked.
 
 The envelope of each channel is its rectified deviation from its mean, averaged over a tenth of a second. Its resting level is the median of
 the session, its scatter the median absolute deviation. What exceeds the level by eight deviations is activity. Torque begins later than
@@ -46,7 +46,7 @@ def mark_activity(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], list[str]
     trials : tuple of Trial
         With `active` set, and `valid` False there.
     lines : list of str
-        What the reader should know.
+        Remarks on the data.
     """
     names = sorted({name for trial in trials for name in trial.emg})
     active = [np.zeros(len(trial), dtype=bool) for trial in trials]
@@ -77,13 +77,13 @@ def _applied(trials: Sequence[Trial], active: list[np.ndarray], lines: list[str]
             lines.append(f"{trial.file}: muscles are active throughout; this is no passive recording")
         elif own.any():
             seconds[trial.file] = float(own.sum()) * trial.dt
-        # A trial that is active throughout is compared as a whole; the line above says what it is.
+        # A trial that is active throughout is compared as a whole; the line above states that.
         marked.append(dataclasses.replace(trial, active=own, valid=trial.valid if throughout else valid))
     return tuple(marked), lines + _activity_line(seconds)
 
 
 def _activity_line(seconds: dict[str, float]) -> list[str]:
-    """Say in one line in which trials, and for how long [s], muscles are active."""
+    """Return one line on the trials, and for how long [s], muscles are active."""
     if not seconds:
         return []
     first, *others = seconds
@@ -94,7 +94,7 @@ def _activity_line(seconds: dict[str, float]) -> list[str]:
 
 
 def joint_activity(trials: Sequence[Trial], muscles: Sequence[Muscle], n_joints: int) -> tuple[tuple[Trial, ...], list[str]]:
-    """Tell the activity of the muscles of each joint: their mean, 0 at rest and 1 in a maximal voluntary contraction.
+    """Return the activity of the muscles of each joint: their mean, 0 at rest and 1 in a maximal voluntary contraction.
 
     That of a muscle is its envelope above rest, relative to that of the contraction, as late as torque follows it. Rest is the median of
     the session and the contraction its largest envelope, where the muscle does not state them.
@@ -111,7 +111,7 @@ def joint_activity(trials: Sequence[Trial], muscles: Sequence[Muscle], n_joints:
     trials : tuple of Trial
         With `activity` set, where there is a muscle.
     lines : list of str
-        What the reader should know.
+        Remarks on the data.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def _levels(envelopes: Sequence[np.ndarray], muscle: Muscle | None) -> tuple[flo
 
 
 def active_kept(trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """Return trials in which what is active counts as well: for a model that says what muscles do."""
+    """Return trials in which what is active counts as well: for a model with effects of muscles."""
     return tuple(dataclasses.replace(trial, valid=trial.valid | trial.active) for trial in trials)
 
 

@@ -33,7 +33,7 @@ class Motion:
     values : ndarray, shape (n, len(names))
         As in the file; NaN where missing.
     in_degrees : bool or None
-        The unit of angles, where the file says it.
+        The unit of angles, where the file states it.
     """
 
     names: list[str]

@@ -1,6 +1,6 @@
-"""What a data set cannot be, whatever the arm is: sensors that say nothing, and angles that contradict those of the robot.
+"""What no data set can be, whatever the arm is: dead sensors, and angles that contradict those of the robot.
 
-It is asked before any physics, so that a wrong column is named as such and not as a poor fit.
+It is checked before any fit, so that a wrong column is named as such and not as a poor fit.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .trial import Trial, constant
 _FAR = 0.3
 """Distance of hand and handle, relative to the arm, beyond which angles of arm and robot contradict each other."""
 _SUSPECT = 0.02
-"""The same, beyond which another reading of the columns is looked for: a mirrored wrist puts the hand that far off, a handle that slips
+"""The same, beyond which another reading of the columns is searched for: a mirrored wrist puts the hand that far off, a handle that slips
 or a soft contact does not."""
 _MET = 0.05
 """The same, up to which hand and handle meet: the angles of the arm are then taken as right."""

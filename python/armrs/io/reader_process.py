@@ -71,7 +71,7 @@ def _limits(path: Path) -> Callable[[], None] | None:
     most, seconds = _MEMORY + _MEMORY_PER_BYTE * path.stat().st_size, math.ceil(LONGEST)
 
     def lower(kind: int, soft: int, hard: int) -> None:
-        # A batch system may have set a lower limit, which nobody but the administrator raises.
+        # A batch system may have set a lower limit, which only the administrator can raise.
         given = resource.getrlimit(kind)[1]
         if given != resource.RLIM_INFINITY:
             soft, hard = min(soft, given), min(hard, given)

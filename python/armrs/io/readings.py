@@ -22,7 +22,7 @@ class Reading:
     Attributes
     ----------
     place, allowed : str
-        Where it differs from what the model means, and what is meant there, as a refusal says it.
+        Where it differs from the definition of the model, and that definition, as in a refusal.
     turn : ndarray, shape (n_joints, n_joints)
     shift : ndarray, shape (n_joints,)
         The angles of the model are `turn` @ q + `shift` [rad].
@@ -115,7 +115,7 @@ def of_forces(n: int) -> Iterator[Reading]:
 
 
 def other_zero(n: int, joint: int, offset: float, *, still: bool = False) -> Reading:
-    """Return the angles with that of a joint, from 1, turned by `offset` [rad]; `still` says that it never changes."""
+    """Return the angles with that of a joint, from 1, turned by `offset` [rad]; with `still` it never changes."""
     shift = np.zeros(n)
     shift[joint - 1] = offset
     size = f"{abs(offset):.2g} rad too {'large' if offset < 0.0 else 'small'}"

@@ -19,7 +19,7 @@ LONGEST_GAP = 0.25
 
 
 def is_even(t: np.ndarray) -> bool:
-    """Tell whether time stamps, shape (n,), lie on a uniform grid."""
+    """Return whether time stamps, shape (n,), lie on a uniform grid."""
     step = (t[-1] - t[0]) / (len(t) - 1)
     return bool(np.max(np.abs(t - t[0] - step * np.arange(len(t)))) <= EVEN * step)
 
@@ -106,7 +106,7 @@ def onto_grid(t: np.ndarray, values: np.ndarray, grid: np.ndarray) -> Channel:
 
 
 def _spans_missing(t: np.ndarray, there: np.ndarray, ts: np.ndarray, left: np.ndarray, width: np.ndarray, step: float) -> np.ndarray:
-    """Tell for each grid time whether its interval lacks samples: an empty cell, or a row that is not there."""
+    """Return for each grid time whether its interval lacks samples: an empty cell, or a row that is not there."""
     rows = np.flatnonzero(there)
     empty = rows[left + 1] - rows[left] > 1
     return empty | (width > 1.5 * step)

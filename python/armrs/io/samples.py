@@ -1,6 +1,6 @@
 """Reading the numbers of a trial from CSV or Parquet, strictly.
 
-Nothing is guessed: a cell is a finite number, or empty where the sample is missing. What is refused is named by line and column.
+Nothing is inferred: a cell is a finite number, or empty where the sample is missing. What is refused is named by line and column.
 """
 
 from __future__ import annotations

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 FEWEST_SAMPLES = 16
 """A trial or a channel with fewer is refused."""
 BRIDGED = 0.05
-"""A larger share of bridged samples is said."""
+"""A larger share of bridged samples is reported."""
 SAME_RATE = 0.01
-"""Time stamps that depart from the stated rate by more than this are said."""
+"""Time stamps that depart from the stated rate by more than this are reported."""
 SLOWEST = 0.5
 """Samples that are as far apart [s] show no movement of an arm; a recording in milliseconds at 1 kHz has 1."""
 SHORTEST, FASTEST = 0.5, 2e-4
 """A recording shorter than this [s] whose samples are nearer than this [s] is in another unit; one in seconds at 25 Hz has 4e-5 s."""
 STILL = 1e-9
-"""A channel that varies by no more than this says nothing: noise alone is more."""
+"""A channel that varies by no more than this is dead: noise alone is more."""
 _TURN = 2.0 * np.pi
 _TABLES = ("emg", "filled_columns", "original")
 
@@ -201,7 +201,7 @@ def refuse_moving_base(trials: Sequence[Trial]) -> None:
 
 
 MOVED = 5e-3
-"""Movement of the first joint that is said [m]: as much of a shoulder in a strapped trunk is skin."""
+"""Movement of the first joint that is reported [m]: as much of a shoulder in a strapped trunk is skin."""
 
 
 def moving_bases(trials: Sequence[Trial]) -> list[str]:
@@ -219,7 +219,7 @@ def moving_bases(trials: Sequence[Trial]) -> list[str]:
 
 @dataclass(frozen=True)
 class Reading:
-    """A trial as read, with what the reader has to tell the user."""
+    """A trial as read, with remarks of the reader."""
 
     trial: Trial
     warnings: tuple[str, ...]
@@ -430,7 +430,7 @@ def _bridged_lines(channels: Mapping[str, resample.Channel]) -> list[str]:
 
 
 def _lines(said: Mapping[str, str]) -> list[str]:
-    """Return what is said of columns, those together of which the same is said: a sensor that drops out is one fact."""
+    """Return remarks on columns, those with the same remark together: a sensor that drops out is one fact."""
     names: dict[str, list[str]] = {}
     for name, text in said.items():
         names.setdefault(text, []).append(name)

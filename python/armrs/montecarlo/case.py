@@ -56,7 +56,7 @@ def _case(sweep: Sweep, number: int) -> tuple[Row, list[Row]]:
         row |= _ended(result)
         return row, _estimates(number, result, truth, _bootstrap(dataset, sweep.question, seed))
     except ArmrsError as error:
-        # A draw that makes no arm, a robot that was stopped, data that cannot answer: a finding about this case, not the end of the sweep.
+        # A draw that makes no arm, a robot that was stopped, data that determine nothing: a finding about this case, no end of the sweep.
         return row | {"status": "failed", "reason": one_line(error)[:_LONGEST_REASON]}, []
 
 
@@ -85,7 +85,7 @@ def _identify(dataset: Dataset, question: Question) -> Identified:
 
 
 def _seen(dataset: Dataset) -> Row:
-    """Return what every case says of its trials; forces [N]."""
+    """Return the values of every case on its trials; forces [N]."""
     sizes = [np.hypot(*t.force_on_arm[np.isfinite(t.force_on_arm).all(axis=1)].T) for t in dataset.trials if t.force_on_arm is not None]
     row: Row = {"trials": len(dataset.trials)}
     if sizes:
@@ -114,7 +114,7 @@ def _bootstrap(dataset: Dataset, question: Question, seed: int) -> dict[tuple[st
         try:
             result = _identify(resampled(dataset, [seed, 2, k]), question)
         except ArmrsError:
-            continue  # told by the number of resamples beside the result
+            continue  # stated by the number of resamples beside the result
         for e in _distinct(result):
             values.setdefault((e.name, e.joint), []).append(e.value)
     return {key: np.array(found) for key, found in values.items()}

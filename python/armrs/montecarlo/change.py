@@ -76,7 +76,7 @@ class Vary:
                 return value
 
     def extremes(self) -> tuple[Any, ...]:
-        """Return the draws by which to see beforehand whether the key can take them."""
+        """Return draws to check beforehand whether the key can take them."""
         return self.numbers if self.kind != "normal" else (self.numbers[0], *(self.within or ()))
 
     def change(self, target: Any, value: Any) -> Any:
@@ -94,7 +94,7 @@ class Vary:
 
 
 def vary_of(place: str, table: Mapping[str, Any]) -> Vary:
-    """Return what a table `[[vary]]` says."""
+    """Return the contents of a table `[[vary]]`."""
     checks.keys(place, table, required=["key"], optional=[*DISTRIBUTIONS, "within", "apply"])
     key = checks.text(f"{place}, key", table["key"])
     place = f"{place} ({key})"
@@ -177,7 +177,7 @@ def _changed(item: Any, path: Path, new: Callable[[Any], Any], key: str) -> Any:
     if isinstance(item, Effect):
         return item.replace(parameters=_changed(dict(item.parameters), path, new, key))
     if isinstance(item, Mapping):
-        # A table whose values all have their defaults need not stand there; what nobody knows is refused when it is read.
+        # A table whose values all have their defaults may be absent; an unknown key is refused when it is read.
         there = item.get(head, {} if rest and isinstance(rest[0], str) else None)
         return {**item, head: _changed(there, rest, new, key)}
     if isinstance(item, (Model, Segment, Joint, Contact)):

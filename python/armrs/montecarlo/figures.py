@@ -51,7 +51,7 @@ def _values(quantities: list[Quantity], joints: list[str]) -> Drawn:
 
 
 def _varies(quantity: Quantity) -> bool:
-    """Whether cases differ by more than rounding: of a value that is the same in all there is nothing to see."""
+    """Whether cases differ by more than rounding: a value that is the same in all is not drawn."""
     values = np.concatenate(quantity.values)
     values = values[np.isfinite(values)]
     return len(values) == 1 or bool(np.ptp(values) > _ROUNDING * np.abs(values).max())

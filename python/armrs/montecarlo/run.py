@@ -72,7 +72,7 @@ def sweep(
     step: Callable[[int], None] = lambda cases: None,
     command: str | None = None,
 ) -> Swept:
-    """Simulate, and where asked identify, many cases: subjects, sensors and movements drawn at random, or resamples of a data set.
+    """Simulate, and optionally identify, many cases: subjects, sensors and movements drawn at random, or resamples of a data set.
 
     Every case has a seed of its own, made of the seed of the sweep and its number: results do not depend on `jobs`, on the cluster or on
     interruptions. A second call goes on where the first one stopped.
@@ -84,13 +84,13 @@ def sweep(
     folder : path
         Gets `cases.parquet`, `estimates.parquet`, `sweep.json`, figures and `report.html`.
     jobs : int
-        Processes on this machine. A script that asks for more than one needs `if __name__ == "__main__":`.
+        Processes on this machine. A script with more than one needs `if __name__ == "__main__":`.
     cluster : str, optional
         Address of a Dask scheduler that does the work instead.
     step : callable
         Called with the number of cases that are done since the last call, those of an earlier run first.
     command : str, optional
-        What to say in the report.
+        Remarks for the report.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def sweep(
 
 
 def _largest_process() -> float | None:
-    """Return the largest memory that this process or one that it started had [MB], where the system tells."""
+    """Return the largest memory that this process or one that it started had [MB], where the system states it."""
     try:
         import resource
     except ImportError:

@@ -171,7 +171,7 @@ def _experiment_document(path: Path) -> dict[str, Any]:
 
 
 def _check_draws(sweep: Sweep) -> None:
-    """Refuse a key that is not there, a range that no experiment can have, and questions that no case can answer."""
+    """Refuse a key that is not there, a range that no experiment can have, and results that no case can have."""
     for k, vary in enumerate(sweep.vary, start=1):
         _check_vary(sweep, vary, f"[[vary]] {k} ({vary.key})")
     if sweep.question is not None:
@@ -235,7 +235,7 @@ def _check_question(question: Question, model: Model) -> None:
 
 
 def _digest(table: Mapping[str, Any], source: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of what the files say, whatever their comments and order of keys, and of the version that reads them."""
+    """Return the SHA-256 of the contents of the files, whatever their comments and order of keys, and of the version that reads them."""
     plain = {key: value.to_toml() if isinstance(value, Model) else value for key, value in source.items()}
     content = json.dumps([_armrs.__version__, table, plain], sort_keys=True, default=str)
     return hashlib.sha256(content.encode()).hexdigest()

@@ -91,7 +91,7 @@ def varied(data: Mapping[str, Any]) -> Table:
 
 
 def count_lines(data: Mapping[str, Any]) -> list[str]:
-    """Return what else there is to say of the cases, a line each."""
+    """Return further remarks on the cases, a line each."""
     force = data["force"]
     lines = []
     if force["peak_mean_N"] is not None:
@@ -127,7 +127,7 @@ def run_line(run: Mapping[str, Any]) -> str:
 
 
 def _is_off(q: Mapping[str, Any], level: float) -> bool:
-    """Tell whether intervals hold the truth less often than chance could make it."""
+    """Return whether intervals hold the truth significantly less often than stated."""
     return bool(q["coverage"] < level - 3.0 * (level * (1.0 - level) / q["cases"]) ** 0.5)
 
 

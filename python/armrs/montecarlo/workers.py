@@ -22,7 +22,7 @@ Done = Iterator[tuple[Part, tuple[list[Row], list[Row]]]]
 _AHEAD = 2
 """Parts that wait for each worker: enough to keep it busy, few enough to keep memory bounded."""
 _PATIENCE = 20
-"""How long an answer of a cluster is waited for [s]."""
+"""Time limit for a response of a cluster [s]."""
 
 
 def here(sweep: Sweep, parts: Sequence[Part]) -> Done:
@@ -91,7 +91,7 @@ def cluster(sweep: Sweep, parts: Sequence[Part], address: str) -> Done:
     Raises
     ------
     BadInput
-        Where no scheduler with workers of this version of armrs answers.
+        Where no scheduler with workers of this version of armrs responds.
     ArmrsError
         When the cluster gives up.
     """

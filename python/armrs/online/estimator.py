@@ -72,7 +72,7 @@ class Carried:
     Attributes
     ----------
     torque, sd : ndarray, shape (n_joints,) or (n, n_joints)
-        With standard deviations [N m]; NaN where a device gives none: the torque is not trusted, or something is not finite.
+        With standard deviations [N m]; NaN where a device gives none: the torque is not reliable, or something is not finite.
     """
 
     torque: np.ndarray
@@ -106,7 +106,7 @@ class _Carries:
 
 
 class Estimator(_Carries):
-    """The online estimator of the C interface with its bits, in the precision of its settings. It learns: `update` changes it.
+    """The online estimator of the C interface with its bits, in the precision of its settings. `update` changes it.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ class Estimator(_Carries):
 
 
 class Compensation(_Carries):
-    """What carries an identified arm on a device that does not learn: `armrs_compensation` as `armrs export-c` fills it.
+    """Compensation of an identified arm on a device without an estimator: `armrs_compensation` as `armrs export-c` fills it.
 
     Parameters
     ----------

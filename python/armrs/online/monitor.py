@@ -90,7 +90,7 @@ class Stop:
 
 
 class Monitor:
-    """The monitor of the C interface. It remembers: after a stop it stays stopped until `reset`.
+    """The monitor of the C interface. After a stop it stays stopped until `reset`.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class Monitor:
         return f"Monitor({len(self.channels)} channels, data at most {self.oldest:g} s old, a check every {self.period:g} s at least)"
 
     def check(self, now: float, values: ArrayLike, *, stamp: float | None = None, moving: bool = False) -> Stop | None:
-        """Look at one control period; return the stop, in every period from the first fault on.
+        """Check one control period; return the stop, in every period from the first fault on.
 
         Parameters
         ----------

@@ -19,7 +19,7 @@ from .log import Log, load_log
 from .settings import Settings, default_settings
 
 RECORDED = 0.01
-"""Time between two recorded states [s], unless a number of periods is asked for."""
+"""Time between two recorded states [s], unless a number of periods is given."""
 NO_REFUSAL = ("taken", "resting", "settling")
 
 
@@ -138,7 +138,7 @@ def replay(
     force_on: str | None = None,
     every: int | None = None,
 ) -> Replay:
-    """Let the estimator of a device learn from a log, and record its states.
+    """Run the estimator of a device on a log, and record its states.
 
     Control periods without a sample in the log are missing samples, as the device would count them. Constant errors of the sensors that the
     model has are taken out of the log first, as `armrs_model_calibrate` does.

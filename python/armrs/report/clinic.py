@@ -82,7 +82,7 @@ SLOW = (
         180.0 / math.pi,
     ),
 )
-"""What slow movements say of a joint."""
+"""Results of slow movements for a joint."""
 Key = tuple[str, str, int]
 """Kind, parameter and joint of a quantity."""
 AS_ARMRS = (1.0, 0.0)
@@ -104,7 +104,7 @@ _MOVING = "a joint has friction and may stick, which the analysis models only ro
 
 @dataclass(frozen=True)
 class Norm:
-    """What is usual of a parameter: `low` to `high`, in SI units, and who says so."""
+    """The usual range of a parameter: `low` to `high`, in SI units, and its source."""
 
     kind: str
     name: str
@@ -116,7 +116,7 @@ class Norm:
 
 @dataclass(frozen=True)
 class Line:
-    """One quantity of one joint, in its unit: `value` is None where these movements do not measure it, `at_limit` says that it may be 0."""
+    """One quantity of one joint, in its unit: `value` is None where these movements do not measure it, with `at_limit` it may be 0."""
 
     joint: str
     quantity: Quantity
@@ -133,7 +133,7 @@ class Line:
 
     @property
     def beside_norm(self) -> str | None:
-        """Say where the interval lies beside what is usual."""
+        """Describe where the interval lies beside the usual range."""
         band = self.norm_band()
         if band is None or self.interval is None:
             return None
@@ -251,7 +251,7 @@ def lines_of(result: Mapping[str, Any], norms: Sequence[Norm] = (), *, bare: boo
 
 
 def _once(lines: Sequence[Line]) -> list[Line]:
-    """Return each quantity of a joint once: as the first result that measures it says."""
+    """Return each quantity of a joint once: from the first result that measures it."""
     first: dict[tuple[str, str], Line] = {}
     for line in lines:
         key = (line.joint, line.quantity.title)
@@ -289,7 +289,7 @@ _WHY = {
 
 
 def _apart(lines: Sequence[Line]) -> list[str]:
-    """Return the quantities of which two results say what cannot both be."""
+    """Return the quantities for which two results contradict each other."""
     said = []
     for line in _once(lines):
         own = [o for o in lines if (o.joint, o.quantity.title) == (line.joint, line.quantity.title) and o.interval is not None]
@@ -299,7 +299,7 @@ def _apart(lines: Sequence[Line]) -> list[str]:
 
 
 def _slow_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]]) -> list[Line]:
-    """Return what slow movements say of each joint, of the movement with an interval and with most repeats, which is known best."""
+    """Return the results of slow movements for each joint, of the movement with an interval and with most repeats, which is known best."""
     lines = []
     for j, joint in enumerate(result["data"]["joints"], start=1):
         curve = _best_known(result, j)
@@ -381,7 +381,7 @@ def _between(interval: Sequence[float], quantity: Quantity, own: tuple[float, fl
 
 
 def _trend(course: Mapping[str, Any] | None, quantity: Quantity, own: tuple[float, float] = AS_ARMRS) -> str | None:
-    """Say how the last session differs from the one before it, and how sure that is."""
+    """Describe how the last session differs from the one before it, and how certain that is."""
     if course is None or len(course["dates"]) < 2 or course.get("since_last") is None or not math.isfinite(course["since_last"]):
         return None
     change, either_way = own[0] * quantity.factor * course["since_last"], quantity.factor * 1.96 * course["since_last_std"]
@@ -391,7 +391,7 @@ def _trend(course: Mapping[str, Any] | None, quantity: Quantity, own: tuple[floa
 
 
 def not_measured(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
-    """Return what these movements say nothing of."""
+    """Return what these movements do not measure."""
     seen = {line.joint for line in lines if line.value is not None}
     said = [f"{joint}: nothing was measured of this joint." for joint in results[0]["data"]["joints"] if joint not in seen]
     if not any(line.quantity.kind == "stretch_reflex" for line in lines):
@@ -400,7 +400,7 @@ def not_measured(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) ->
 
 
 def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
-    """Return what would answer what is open."""
+    """Return measurements that would decide what is open."""
     said = []
     unclear = [line for line in lines if line.trend is not None and line.trend.startswith(session_changes.NO_CHANGE)]
     if unclear:
@@ -513,7 +513,7 @@ def found(result: Mapping[str, Any]) -> list[str]:
 
 
 def notes(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what the analysis says against its own numbers."""
+    """Return the reservations of the analysis about its own numbers."""
     said = [str(check["text"]) for result in results for check in result.get("checks", ()) if check["passed"] is False]
     said = together(said + [with_joint_names(str(line), r["data"]["joints"]) for r in results for line in r.get("warnings", ())])
     more = len(said) - MOST_NOTES
@@ -550,14 +550,14 @@ def _is_dry(kind: str) -> bool:
 
 
 def _intervals(doubted: Sequence[str]) -> str:
-    """Return what intervals claim."""
+    """Return the meaning of the intervals."""
     beside = f"; here they may be too narrow: {'; '.join(dict.fromkeys(doubted))}" if doubted else ""
     return f"95 % intervals. They hold if the joint behaves as a spring with resistance and friction{beside}."
 
 
 def _picture(lines: Sequence[Line], intervals: str) -> html.Picture | None:
     """Draw every quantity with its interval, one panel each, the usual range behind."""
-    # How far a joint was moved was chosen: the table says it.
+    # How far a joint was moved was chosen: the table states it.
     shown = [
         q for q in (*QUANTITIES, *SLOW) if q.parameter != "range" and any(line.quantity is q and line.value is not None for line in lines)
     ]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 FIRST_LINE = 5.0
-"""Time after which work that is not shown on a terminal says for the first time what it does [s]."""
+"""Time after which work that is not shown on a terminal first reports its stage [s]."""
 
 
 def warn(lines: Iterable[str]) -> None:
@@ -66,7 +66,7 @@ def progress(what: str, total: int | None = None) -> Iterator[Callable[[int], No
 
 @contextmanager
 def stages(what: str) -> Iterator[Callable[[str, float], None]]:
-    """Show work that tells its stage and its share, on standard error, as `progress` does.
+    """Show the stage and the share of work, on standard error, as `progress` does.
 
     Yields
     ------

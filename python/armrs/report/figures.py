@@ -79,7 +79,7 @@ def identified(result: Identified, data: Mapping[str, Any]) -> Figures:
 
 
 def _measured_in_joints(data: Mapping[str, Any], joints: Sequence[str]) -> list[tuple[int, str]]:
-    """Return what the measurement says of each joint: its number, and words."""
+    """Return the result of the measurement for each joint: its number, and words."""
     items = [p for p in data["parameters"] if p["joint"] and p["kind"] not in ("segment", "combination") and p["decided_by"] == "data"]
     return [
         (p["joint"], f"{joints[p['joint'] - 1]}: {tables.label(p)} {tables.plus_minus(p['value'], p['std'])} "
@@ -254,7 +254,7 @@ def _torques(result: Identified, configuration: str, joints: Sequence[str]) -> D
 
 
 def _elapsed(explained: Explained) -> np.ndarray:
-    """Return times since the start of the trial, so that repeats lie on one another whatever their clock says."""
+    """Return times since the start of the trial, so that repeats are superposed on any clock."""
     return explained.t - explained.trial.t[0]
 
 

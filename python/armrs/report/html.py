@@ -95,7 +95,7 @@ def with_contents(part: Markup, number: int) -> Markup:
         places.append(f'<li><a href="#{place}">{found[1]}</a></li>')
         return f'<h2 id="{place}">{found[1]}</h2>'
 
-    # What a file says is escaped, so that no heading is in it.
+    # Text from a file is escaped, so that no heading is in it.
     text = _HEADING.sub(marked, str(part))
     listed = f'<nav class="contents" aria-label="Contents, part {number}"><ul>{"".join(places)}</ul></nav>' if len(places) > 2 else ""
     return Markup(text.replace(str(CONTENTS), listed))
@@ -146,7 +146,7 @@ def write_page(
     styles: Sequence[str] = (),
     scripts: Sequence[str] = (),
 ) -> None:
-    """Write a page of finished parts, with styles and scripts from files beside the templates; it says which verb was its `maker`.
+    """Write a page of finished parts, with styles and scripts from files beside the templates; it states the verb that was its `maker`.
 
     Its Content-Security-Policy allows these styles and scripts, by their SHA-256, and images that are in the page; nothing else.
     """

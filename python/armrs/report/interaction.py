@@ -48,7 +48,7 @@ def _forces(name: str, runs: tuple[Interacted, ...]) -> Drawn:
 
 
 def _stiffness(name: str, story: Mapping[str, Any]) -> Drawn:
-    """Draw the force that answers a displacement of 1 cm in every direction (Mussa-Ivaldi, Hogan and Bizzi 1985)."""
+    """Draw the force at a displacement of 1 cm in every direction (Mussa-Ivaldi, Hogan and Bizzi 1985)."""
     figure = plotting.figure(5.2, 4.6)
     ax = figure.subplots()
     around = np.linspace(0.0, 2.0 * np.pi, 181)

@@ -16,7 +16,7 @@ from .live import Live
 from .series import Line, Panel, series
 
 MOST_SAMPLES = 6000
-"""Samples of a run that are looked at; of a longer one every second, third …"""
+"""Most samples of a run that are used; of a longer one every second, third …"""
 AXES = ("forward, y", "up, z")
 SERIES = "Interactive time series"
 

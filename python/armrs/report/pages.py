@@ -1,6 +1,6 @@
 """One self-contained HTML page of any result: styles and pictures are in it, and nothing is loaded from elsewhere.
 
-It arranges what a result says as plain data (its JSON) and the figures beside it; nothing is computed here. The text stands in
+It arranges a result as plain data (its JSON) and the figures beside it; nothing is computed here. The text stands in
 `templates/`, a template a verb.
 """
 
@@ -89,11 +89,11 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
     Parameters
     ----------
     sources : sequence of path
-        JSON files of results. Figures are taken from where these say, relative to themselves.
+        JSON files of results. Figures are taken from the paths in these, relative to themselves.
     path : path
         The HTML file.
     maker : str
-        The verb that the page says it was made by: no other verb replaces it.
+        The verb that made the page, as stated in it: no other verb replaces it.
 
     Returns
     -------

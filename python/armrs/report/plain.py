@@ -29,7 +29,7 @@ def origin(command: str | None) -> dict[str, Any]:
 
 
 def data_of(dataset: Dataset) -> dict[str, Any]:
-    """Return what a report says of a data set."""
+    """Return the lines of a report on a data set."""
 
     def of(role: str) -> dict[str, Any]:
         trials = [t for t in dataset.trials if t.role == role]
@@ -133,7 +133,7 @@ def simulated_data(result: Run, name: str, command: str | None = None) -> dict[s
 
 
 def _assumed(result: Simulated) -> list[str]:
-    """Return what a run of an arm that is led took for granted because its model does not say it, a sentence each."""
+    """Return the assumptions of a run of a led arm on what its model does not state, a sentence each."""
     lines: list[str] = []
     if result.columns.get("handle") is None:
         return lines

@@ -1,6 +1,6 @@
 """Plots. Each function draws data that are given to it into `ax` (a new one when absent) and returns the Axes; nothing is computed here.
 
-Angles come in radians and are shown in degrees. Colours tell quantities apart also for colour-blind eyes, and lines and markers differ too.
+Angles come in radians and are shown in degrees. Colours are distinguishable for colour-blind readers, and lines and markers differ too.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def grid(count: int) -> tuple[int, int]:
 
 
 def figure(width: float, height: float) -> Figure:
-    """Return an empty figure [inches]; but for `in_pyplot`, no window and no global state knows it."""
+    """Return an empty figure [inches]; but for `in_pyplot`, it is in no window and no global state."""
     if _IN_PYPLOT.get():
         from matplotlib import pyplot
 
@@ -130,7 +130,7 @@ def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
 
 
 def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:
-    """Plot the torque of one joint that the measurement asks for, and that of the fitted model.
+    """Plot the torque of one joint that follows from the measurement, and that of the fitted model.
 
     Parameters
     ----------
@@ -381,7 +381,7 @@ def _broken(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shade(share: float) -> Any:
-    """Return a colour for a place in an order, 0 to 1, that also tells in grey."""
+    """Return a colour for a place in an order, 0 to 1, that is distinguishable in grey."""
     import matplotlib
 
     return matplotlib.colormaps["viridis"](0.85 * share)

@@ -28,7 +28,7 @@ class Titled(Protocol):
 
 
 class Row(Protocol):
-    """A quantity of one joint with what its trend says."""
+    """A quantity of one joint with its trend."""
 
     @property
     def joint(self) -> str:
@@ -40,11 +40,11 @@ class Row(Protocol):
 
     @property
     def trend(self) -> str | None:
-        """As `trend` says it."""
+        """As in `trend`."""
 
 
 def trend(change: float, either_way: float, before: float | None, *, clear: bool) -> str:
-    """Say a change: by how much, both with the digits of its uncertainty, and as a share of `before`, where that means something."""
+    """Describe a change: by how much, both with the digits of its uncertainty, and as a share of `before`, where that means something."""
     size = either_way if either_way > 0.0 and math.isfinite(either_way) else abs(change)
     decimals = two_digits(size) if size > 0.0 else 0
     width = f"{either_way:.{decimals}f}"

@@ -22,7 +22,7 @@ _MOST_DECIMALS = 6
 
 @dataclass(frozen=True)
 class Table:
-    """Head and rows; the first `left` columns hold words, and the first names quantities where `symbols` says so."""
+    """Head and rows; the first `left` columns hold words, and with `symbols` the first names quantities."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
@@ -53,7 +53,7 @@ def how_many(number: int, what: str, several: str | None = None) -> str:
 
 
 def probability(value: float) -> str:
-    """Write a probability; what is below 1e-12 is not told apart."""
+    """Write a probability; values below 1e-12 are not distinguished."""
     return "< 1e-12" if value < 1e-12 else f"{value:.2g}"
 
 
@@ -84,7 +84,7 @@ def estimates(items: Iterable[Mapping[str, Any]], joints: Sequence[str], level: 
 
 
 def _note(item: Mapping[str, Any]) -> str | None:
-    """Return what is to be said against an estimate: its caveat, and that its interval ends at a physical limit."""
+    """Return the reservations about an estimate: its caveat, and that its interval ends at a physical limit."""
     said = [item["caveat"]] if item.get("caveat") else []
     below, above = (abs(end - item["value"]) for end in item["interval"])
     if min(below, above) < _EVEN * max(below, above):
@@ -98,7 +98,7 @@ def deciding(items: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def measured(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the estimates of an identification that rest on the measurement and can be trusted, combinations first, each once."""
+    """Return the estimates of an identification that rest on the measurement and are reliable, combinations first, each once."""
     found = {
         (label(e), e["joint"]): e
         for e in (*result["combinations"], *result["parameters"])
@@ -281,7 +281,7 @@ def coupling_errors(data: Mapping[str, Any]) -> Table:
 
 
 def online(data: Mapping[str, Any]) -> Table:
-    """Return what an online estimator knows of every unknown."""
+    """Return the estimate of every unknown by an online estimator."""
     joints = data["data"]["joints"]
     rows = [
         [symbol(e["name"]), where(e, joints), number(e["value"], e["std"]), spread(e["std"]), unit(e["unit"]), e["decided_by"]]

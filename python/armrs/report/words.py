@@ -62,7 +62,7 @@ def name(result: Mapping[str, Any]) -> str:
 
 
 def is_synthetic(result: Mapping[str, Any]) -> bool:
-    """Tell whether a result rests on simulated data."""
+    """Return whether a result rests on simulated data."""
     return bool(result["data"].get("synthetic"))
 
 
@@ -181,7 +181,7 @@ def data_lines(data: Mapping[str, Any]) -> list[str]:
 
 
 def decided_lines(items: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what the words mean that say what decided these estimates."""
+    """Return the meaning of the words for what decided these estimates."""
     present = {e["decided_by"] for e in items}
     return [f"Decided by {key}: it rests on {meaning}." for key, meaning in tables.DECIDED_BY.items() if key in present]
 
@@ -192,7 +192,7 @@ def check_lines(result: Mapping[str, Any]) -> list[str]:
 
 
 def cannot_tell(result: Mapping[str, Any]) -> list[str]:
-    """Return what the data cannot tell, a line each."""
+    """Return what the data cannot determine, a line each."""
     units = {tables.symbol(item["name"]): tables.unit(item["unit"]) for item in (*result["parameters"], *result["combinations"])}
     lines = [_trade(line, units) for line in result["not_separable"]]
     if result["scale_free"]:
@@ -201,12 +201,12 @@ def cannot_tell(result: Mapping[str, Any]) -> list[str]:
 
 
 def independent(result: Mapping[str, Any]) -> str:
-    """Say of how many unknowns the movements show how much."""
+    """Describe how many unknowns the movements determine."""
     return f"of {result['unknowns']} unknowns the movements show {result['rank']} independent combinations"
 
 
 def _trade(line: str, units: Mapping[str, str]) -> str:
-    """Say in a sentence which quantities trade: `m2 and m1*l1 trade 1 : -0.376`."""
+    """Write a sentence on which quantities trade: `m2 and m1*l1 trade 1 : -0.376`."""
     names, trades, ratio = tables.symbol(line).partition(" trade ")
     if not trades:
         return f"{names}."
@@ -239,7 +239,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 
 def sticking_lines(result: Mapping[str, Any]) -> list[str]:
-    """Say in which joints dry friction that sticks took the place of smooth friction, a line each."""
+    """Return in which joints dry friction that sticks replaced smooth friction, a line each."""
     why = "sticks (smoothing 0): with the smooth law, simulated angles and forces are further from the recorded ones."
     return [f"Dry friction in joint {j} {why}" for j in result.get("sticks", ())]
 
@@ -312,7 +312,7 @@ _COUPLED = {
 
 
 def couplings(result: Mapping[str, Any]) -> list[str]:
-    """Say for each pair of joints whether their elastic moments depend on one another."""
+    """Return for each pair of joints whether their elastic moments depend on one another."""
     found = result.get("couplings", ())
     lines = [
         f"{' and '.join(c['joint_names'])}: {_COUPLED[c['coupled']]}, "
@@ -460,7 +460,7 @@ def reproduced(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 
 def together(lines: Sequence[str]) -> list[str]:
-    """Return lines that say the same of several movements or recordings (`NAME: what`) as one, where the first of them stood."""
+    """Return lines that are the same for several movements or recordings (`NAME: what`) as one, at the place of the first."""
     said: dict[str, list[str]] = {}
     for line in lines:
         name, colon, what = line.partition(": ")

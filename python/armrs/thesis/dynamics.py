@@ -252,7 +252,7 @@ def speeds() -> Found:
     virtual=False,
 )
 def printed_equations() -> Found:
-    """Say what the misprints of the equations of motion amount to for the arm of table 4.10."""
+    """Compute the size of the misprints of the equations of motion for the arm of table 4.10."""
     model = arm(TABLE_4_10)
     (a1, a2, _), (_, l2, l3), m3 = (s.length for s in TABLE_4_10), (s.com for s in TABLE_4_10), TABLE_4_10[2].mass
     q, qd, force = np.radians([-40.0, 50.0, 10.0]), np.array([0.2, 0.5, 0.3]), np.array([5.0, 10.0])

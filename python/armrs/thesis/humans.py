@@ -30,7 +30,7 @@ POSTURES = ((-70.0, 40.0), (-50.0, 60.0), (-30.0, 60.0), (-40.0, 90.0))
 SWING = (12.0, 3.4, 1.8)
 SPEED = 0.03
 LITERATURE = 0.1
-"""Relative standard deviation of what the literature says of a single person."""
+"""Relative standard deviation of literature values for a single person."""
 WIDE = 0.5
 """The same for the cascade, whose bounds the thesis calls suitable: three times this to both sides, so that the data decide what they "
 "can."""

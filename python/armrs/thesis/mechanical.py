@@ -299,7 +299,7 @@ LIMITS = {"m1·l1 + a1·m2": 1.0, "m2·l2": 1.0, "τp1": 3.0, "τp2": 3.0}
 def expected(exact: bool) -> dict[str, float]:
     """Return relative standard deviations to be expected of ten measurements with brakes on [%].
 
-    `exact` sensors have noise alone; otherwise their calibration is promised as by default: 0.3°, 0.2 N, 1 %, 5 ms, 1 mm.
+    `exact` sensors have noise alone; otherwise their calibration has the default tolerances: 0.3°, 0.2 N, 1 %, 5 ms, 1 mm.
     """
     believed = people.mechanical(True).replace(segment_uncertainty=demo.TOO_HEAVY - 1.0)
     path = Movement(MECHANICAL_PATH.waypoints, speed=SPEED, acceleration=0.2)

@@ -145,7 +145,7 @@ def _with_activity(run: Simulated, emg: dict[str, np.ndarray]) -> Trial:
     "Composite photographs: the mechanical arm turns by 11.4 and 11.5°, the human arm by 12, 3.4 and 1.8°.",
 )
 def small_movements() -> Found:
-    """Draw both movements and say what they can show."""
+    """Draw both movements and return what they can show."""
     figure = plotting.figure(9.4, 3.6)
     rows: list[list[str | None]] = []
     for ax, model, path, title in zip(

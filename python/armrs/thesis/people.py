@@ -1,7 +1,7 @@
 """Who and what is simulated: the mechanical arm, virtual subjects, the robots, and how trials of them are read.
 
 The thesis prints no measured samples. Where an item needs some, they come from the closed-chain simulation of these arms, read by the
-sensors of section 3; every number that the thesis does not give is chosen here and said to be.
+sensors of section 3; every number that the thesis does not give is chosen here and marked as chosen.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ RATE = 50.0
 SUBJECT_ONE = Subject(77.0, 1.80, "male")
 """Body mass as section 4.2.2 prints it [kg]; the height is chosen [m]."""
 WRIST = Joint("wrist", stiffness=12.0, viscosity=0.05, coulomb=0.03)
-"""A hand strapped to the handle: the wrist stays within a few degrees, as section 3.4.1 says."""
+"""A hand strapped to the handle: the wrist stays within a few degrees, as in section 3.4.1."""
 
 
 def mechanical(brakes: bool) -> Model:

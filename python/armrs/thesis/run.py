@@ -28,7 +28,7 @@ class Reproduced:
     Attributes
     ----------
     data : dict
-        Everything that the page says, as plain data.
+        The contents of the page, as plain data.
     files : tuple of Path
         What was written, the page last.
     """
@@ -76,7 +76,7 @@ def run_reproduce(
 
 
 def _draw(found: Found, out: Path, virtual: bool) -> list[Path]:
-    """Write the figures; one of virtual data says so, since it may be shown away from the page."""
+    """Write the figures; one of virtual data is marked, since it may be shown away from the page."""
     paths = []
     for drawn in found.figures:
         path = out / "figures" / f"{drawn.name}.png"
@@ -90,7 +90,7 @@ def _draw(found: Found, out: Path, virtual: bool) -> list[Path]:
 
 
 def _stamp(figure: Figure) -> None:
-    """Say at the foot of a figure that its data are virtual, in a strip of its own."""
+    """Write at the foot of a figure that its data are virtual, in a separate strip."""
     foot = 0.16 / figure.get_figheight()
     layout: Any = figure.get_layout_engine()
     layout.set(rect=(0.0, foot, 1.0, 1.0 - foot))

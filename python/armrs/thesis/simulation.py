@@ -27,7 +27,7 @@ GROUP = Group("simulation", "Simulation (4.3)")
 VISCOSITY, ELASTICITY = 0.2, 0.5
 """Parameters of the joints in the table after 4.10 [N m s/rad, N m/rad]; K_v is printed as −0.2, which feeds every oscillation."""
 SPEED, ACCELERATION = 0.06, 0.2
-"""Chosen: appendix C says at most 0.03 rad/s, section 3.2 about 0.2."""
+"""Chosen: at most 0.03 rad/s in appendix C, about 0.2 in section 3.2."""
 MECHANICAL_PATH = Movement(np.radians([[-60.0, 50.0], [-48.6, 61.5], [-60.0, 50.0]]), speed=SPEED, acceleration=ACCELERATION)
 """Shoulder by 11.4°, elbow by 11.5° (figure 3.12); where is chosen."""
 HUMAN_PATH = Movement(np.radians([[-60.0, 60.0, 0.0], [-48.0, 63.4, 1.8], [-60.0, 60.0, 0.0]]), speed=SPEED, acceleration=ACCELERATION)

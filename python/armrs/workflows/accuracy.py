@@ -1,4 +1,4 @@
-"""How accurate a simulated run is: what its own energy says, and what the same run with half the step says."""
+"""How accurate a simulated run is: by its energy balance, and by comparison with the same run at half the step."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ROUNDING = 1e-10
 
 
 class Piece(Protocol):
-    """What is judged of a piece of a simulated run; see `armrs.Simulated`."""
+    """The part of a piece of a simulated run that accuracy is estimated from; see `armrs.Simulated`."""
 
     @property
     def columns(self) -> Mapping[str, np.ndarray]:

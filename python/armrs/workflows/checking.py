@@ -1,4 +1,4 @@
-"""Every problem of a data set at once, and what each verb will be able to tell from it."""
+"""Every problem of a data set at once, and what each verb can determine from it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .passive import PassiveCurve, passive_moments
 _LATE, _LATE_BY = 0.06, 2.0
 """Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
 _LONG = 3.0
-"""Length of a segment from which on its unit is asked for [m]."""
+"""Length of a segment from which on its unit is doubtful [m]."""
 _SAME_RATE = 0.02
 """Relative difference of two sampling rates up to which they count as the same."""
 
@@ -243,7 +243,7 @@ _WARNINGS = (
 
 
 _MISREAD = ("if read otherwise", "from the robot's handle")
-"""Words of errors of columns that hold something else than their names say."""
+"""Words of errors of columns that hold something else than their names state."""
 _OF_FORCES = ("times the masses", "the forces do not decide")
 """Words of warnings that are computed with the forces as given."""
 _OF_VALUES = (*_OF_FORCES, "hand and handle", "at a higher rate", "in the fit trials: what holds it")
@@ -261,8 +261,8 @@ _COLUMN = re.compile(r"\bcolumn (\w+)(?=:| jumps)")
 def _not_implied(problems: Iterable[Problem]) -> list[Problem]:
     """Return problems without what only follows from an error.
 
-    Of columns that hold something else, and of dead sensors, no weight can be told; and a dead sensor is no joint that is held. What
-    columns probably hold is told once, whether the robot's handle or the balance of the arm shows it.
+    Columns that hold something else and dead sensors give no weight, and a dead sensor is no joint that is held. What
+    columns probably hold is stated once, whether the robot's handle or the balance of the arm shows it.
     """
     told = list(problems)
     errors = [p.text for p in told if p.level == "error"]
@@ -319,7 +319,7 @@ def _read_or_left_out(path: Path, entry: TrialEntry, joints: int, description: D
 
 
 def _joints_of(path: Path) -> int:
-    """Return of how many joints a trial has angles; where the model cannot be read, nothing else tells."""
+    """Return the number of joints with angles in a trial, for a model that cannot be read."""
     header: Sequence[str] = ()
     with suppress(OSError):  # `read_entry` says why the file cannot be read
         header = header_of(path)
@@ -327,7 +327,7 @@ def _joints_of(path: Path) -> int:
 
 
 def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
-    """Ask each trial by itself, so that one dead sensor does not hide another."""
+    """Check each trial by itself, so that one dead sensor does not hide another."""
     for trial in dataset.trials:
         one = dataset.replace(trials=(trial,))
         dead = list(plausibility.dead_forces(one))
@@ -340,7 +340,7 @@ def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
 
 
 def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
-    """Ask each trial by itself, whatever all together say: one may have been recorded otherwise."""
+    """Check each trial by itself, whatever the result for all together: one may have been recorded otherwise."""
     trials = setup.balanced_trials(dataset)
     met = plausibility.hand_meets_handle(dataset)
     if dataset.model.gravity and setup.wrong_setup(dataset.model, trials, met=met) is None:
@@ -350,7 +350,7 @@ def _balanced(dataset: Dataset, problems: list[Problem]) -> None:
 
 
 def _without_robot(dataset: Dataset) -> list[Problem]:
-    """Return that angles of a robot were recorded which nothing can use, since the model does not say where the robot stands."""
+    """Return that angles of a robot were recorded which cannot be used, since the model has no place of the robot."""
     if dataset.model.robot is not None or not any(t.robot_q is not None for t in dataset.trials):
         return []
     text = "[robot] in the model: found nothing, though the trials hold the robot's angles (qr1, qr2): gap compares joint torques only"
@@ -361,7 +361,7 @@ def _without_robot(dataset: Dataset) -> list[Problem]:
 def _clocks(dataset: Dataset, errors: Sequence[str]) -> Iterator[Problem]:
     """Give the trials whose forces are late or early against their angles by more than a calibration may leave.
 
-    Trials with errors, and all where angles are counted otherwise, are not asked.
+    Trials with errors are not checked, and none where angles are counted otherwise.
     """
     if not dataset.model.gravity or any("if read otherwise" in text and " more: " in text for text in errors):
         return

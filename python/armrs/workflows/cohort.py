@@ -28,7 +28,7 @@ from .passive import passive_moments
 LEVEL = 0.95
 """Share of sessions that a norm band holds, and probability of the intervals."""
 FEWEST = 3
-"""Subjects of a group without whom nothing is said of it."""
+"""Fewest subjects of a group that is summarised."""
 NEEDED = ("subject", "quantity", "value")
 MAY = ("unit", "std", "group", "side", "date")
 COLUMNS = (*NEEDED, *MAY)
@@ -44,7 +44,7 @@ class Value:
         Empty where nothing is known.
     value : float
     std : float or None
-        What the measurement knows of its own uncertainty.
+        Standard deviation of the value by its measurement.
     """
 
     subject: str
@@ -409,7 +409,7 @@ def _passive(dataset: Path) -> dict[str, Any] | str:
 
 
 def _of_result(data: Mapping[str, Any], groups: Mapping[str, tuple[str, str]]) -> list[Value]:
-    """Return what one result says of its subject."""
+    """Return the values of the subject in one result."""
     name = str(data["data"]["name"])
     subject = str(data["data"].get("subject") or without_date(name) or name)
     group, side = groups.get(name, groups.get(subject, ("", "")))

@@ -1,7 +1,7 @@
 """The main job on built-in data: an experiment on the thesis' mechanical arm, a search for what its model lacks, the gap before and after.
 
-Everything is simulated, and the model handed over lacks the brakes of both joints. The search over the whole catalogue is told nothing of
-them; what it finds is added, and what that is worth is measured on test trials.
+Everything is simulated, and the given model lacks the brakes of both joints. The search over the whole catalogue has no information about
+them; what it finds is added, and the gap before and after is measured on test trials.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ TOO_HEAVY = 1.1
 
 THESIS = {"m1*l1 + a1*m2": 0.7185, "m2*l2": 0.125, "m2": 1.206, "l2": 0.104, "m1*l1": 0.265, "torque 1": 0.151, "torque 2": 0.145}
 """What the thesis identified on the real arm with brakes on, table 4.5; the first from m1*l1 and m2. The relative errors printed there
-refer in part to rounded references or to none that can be told, so that they are computed again from these."""
+refer in part to rounded or unstated references, so they are computed again from these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +296,7 @@ def _left_over(found: Identified, passive: PassiveMoments) -> list[figures.Part]
 
 
 def _shown(made: Demonstration, command: str | None = None) -> tuple[dict[str, Any], figures.Figures]:
-    """Return what is said and drawn of a demonstration."""
+    """Return text and figures of a demonstration."""
     found, passive = made.identified, made.passive
     rows = comparison(made.truth, found)
     joints = [joint.name for joint in made.truth.joints]
@@ -342,7 +342,7 @@ def search_verdict(gap: GapFound) -> str:
 
 
 def of_slow_movements(slow: GapFound) -> list[str]:
-    """Return what the slow movements alone can tell, a line for each effect that is named."""
+    """Return what the slow movements alone can determine, a line for each named effect."""
     lines = []
     for effect in gap_data(slow)["effects"]:
         rivals = dict.fromkeys(a["kind"] for a in effect["alternatives"] if a["joint"] == effect["joint"])

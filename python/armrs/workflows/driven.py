@@ -33,7 +33,7 @@ class CoreDrive:
 
 @dataclass(frozen=True)
 class CoreRun:
-    """How a run is computed: where it starts, its length [s] where the drive does not say it, and time from sample to sample [s]."""
+    """How a run is computed: where it starts, its length [s] where the drive does not define it, and time from sample to sample [s]."""
 
     integrator: str
     dt: float
@@ -71,7 +71,7 @@ def driven(model: Model, drive: Movement | Trial | None, coupling: str) -> CoreD
 
 
 def about(drive: Movement | Trial | None, error: BadInput, more: str = "") -> BadInput:
-    """Return a refusal of the core with the file of the drive, where it is about how that leads the arm; `more` is said of its length."""
+    """Return a refusal of the core with the file of the drive, where it is about how that leads the arm; `more` is for its length."""
     if drive is None:
         return error
     if error.place == "duration":

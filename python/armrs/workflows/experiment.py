@@ -25,7 +25,7 @@ THESIS_ROBOT = Robot(lengths=(0.45, 0.45), base=(1.05, -0.10))
 THESIS_CONTACT = Contact(stiffness=(10_000.0, 10_000.0), damping=(25.0, 25.0))
 FAULTS = ("runaway", "frozen", "nan", "late", "force")
 YIELDING_MARGIN_DEG = 30.0
-"""How far a robot whose handle yields may be outside of the required angles unless `[safety]` says otherwise."""
+"""How far a robot with a compliant handle may be outside of the required angles, unless set in `[safety]`."""
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
     runs = tuple(_run(f"[[movement]] {k}", t, n) for k, t in enumerate(checks.tables("movement", document["movement"]), 1))
     names = [run.configuration for run in runs]
     for k, name in enumerate(names):
-        # Trials are files of this name below the folder asked for, and nowhere else.
+        # Trials are files of this name below the requested folder, and nowhere else.
         if not name or name.startswith(".") or any(c in name for c in "/\\\0"):
             raise BadInput(f"[[movement]] {k + 1}, configuration", name, "a name that files can have")
         if name in names[:k]:

@@ -28,8 +28,8 @@ class SimulationFit(Framed):
     Attributes
     ----------
     values, sd : dict of str to float
-        Estimate of every free parameter and its standard deviation, if the noise is white and as large as was said; in the
-        parameter's own unit. Infinite where the record is silent.
+        Estimate of every free parameter and its standard deviation, if the noise is white and as large as stated; in the
+        parameter's own unit. Infinite where the record does not determine it.
     at_bound : tuple of str
         Parameters that a bound holds.
     residual_rms : float
@@ -158,7 +158,7 @@ def _bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:
 
 
 def _place(effects: list[Effect], name: str) -> tuple[int, int, float, float]:
-    """Return index of effect and parameter that a name stands for, and the bounds of the catalogue."""
+    """Return index of effect and parameter of a name, and the bounds of the catalogue."""
     known = {}
     for index, effect in enumerate(effects):
         for number, parameter in enumerate(catalogue()[effect.kind].parameters):

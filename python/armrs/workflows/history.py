@@ -99,7 +99,7 @@ class Course:
     dates : tuple of str
         ISO dates, in order.
     values, stds : ndarray, shape (n_sessions,)
-        A deviation is the wider half of the interval, in normal quantiles: few trials, which know their own scatter badly, count as few.
+        A deviation is the wider half of the interval, in normal quantiles: few trials, whose scatter is uncertain, count as few.
     change, change_std : float
         The last value less the mean of those before, weighted by certainty; NaN where there is none to compare with. Sessions compare
         when the data decided the same parameters of that joint: where another one sat at a bound, a deviation means less.
@@ -220,7 +220,7 @@ def subject_of(dataset: Dataset) -> str:
     Raises
     ------
     BadInput
-        When neither says anything.
+        When neither is given.
     """
     name = dataset.subject.name or without_date(dataset.name)
     if not name:

@@ -54,15 +54,15 @@ class Identified(Tabular, Series):
     correlations : ndarray, shape (n_correlated, n_correlated)
         Correlations of their errors.
     contradictions : tuple of str
-        What in the result cannot be true of this arm and these sensors: a mass at its limit, a calibration far beyond its tolerance,
-        a torque that is not described at all. Then no number is to be trusted.
+        Values of the result that are impossible for this arm and these sensors: a mass at its limit, a calibration far beyond its
+        tolerance, a torque that is not described at all. Then no number is reliable.
     misfits : tuple of str
         Joints whose torque the fitted model does not describe well, and speeds that are noise. Intervals hold only where the model's
         structure is right.
     left_out : tuple of str
         What of the model the method does not take into account, or finds nothing about in these movements.
     trades : tuple of str
-        Which unknowns the movements cannot tell apart, in words.
+        Which unknowns the movements cannot distinguish, in words.
     scale_free : bool
         No torque acted: all parameters are known up to one common factor, which was taken from the model.
     level : float
@@ -152,7 +152,7 @@ class Identified(Tabular, Series):
 
     @property
     def trades(self) -> tuple[str, ...]:
-        """Which unknowns the movements cannot tell apart, in words."""
+        """Which unknowns the movements cannot distinguish, in words."""
         return self.result.trades
 
     @property
@@ -222,7 +222,7 @@ class Identified(Tabular, Series):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user has to know besides the numbers, a line each."""
+        """Remarks for the user, a line each."""
         return (*self.contradictions, *self.misfits, *self.left_out)
 
     def to_dict(self) -> dict[str, Any]:
@@ -268,7 +268,7 @@ def identify(
     Notes
     -----
     The default smoothing of dry friction, 0.01 rad/s, is no property of an arm: along simulated motion such friction is fitted as
-    set-valued too, with which a joint sticks. That law stands in `model` where simulated angles and forces are plainly closer to the
+    set-valued too, with which a joint sticks. That law stands in `model` where simulated angles and forces are significantly closer to the
     recorded ones with it. Another smoothing is kept.
 
     Raises
@@ -302,7 +302,7 @@ def identify(
 
 
 def _with_muscles(dataset: Dataset, effects: list[Effect], fitted: list[bool]) -> tuple[Dataset, list[Effect], list[bool]]:
-    """Return a data set in which active samples count if effects say what muscles do, and those of joints whose muscles are recorded.
+    """Return a data set in which active samples count if there are effects of muscles, and those of joints whose muscles are recorded.
 
     Without such effects an active arm is no passive one: its active samples stay left out.
     """
@@ -344,7 +344,7 @@ def _checked(
 
 
 def _result(dataset: Dataset, found: Identification, effects: list[Effect], follows: Sequence[str], weight: Weight | None) -> Identified:
-    """Return what the core found, with what is to be said of it."""
+    """Return the result of the core, with remarks."""
     model = dataset.model
     noisy = _noisy_speeds(found.speed_noise)
     parameters, combinations, calibration = (
@@ -410,7 +410,7 @@ LEVELS: dict[str, Any] = {"least": 0.5, "most": 0.999999}
 
 
 def cascade_can(with_effects: Sequence[str], motion: str) -> None:
-    """Refuse what the cascade would silently leave out: it holds what depends on the rate at what the model says."""
+    """Refuse effects that the cascade would silently leave out: it holds rate-dependent ones at their values in the model."""
     found = [name for name, kind in _joint_kinds().items() if kind.rate_independent]
     for kind in with_effects:
         if kind in _joint_kinds() and kind not in found:
@@ -440,11 +440,11 @@ def _unmoved(method: str, parameters: Sequence[Estimate]) -> tuple[str, ...]:
 PASSIVE_LAWS = tuple(kind for _, kind, _ in _armrs.JOINT_LAWS)
 """What resists in every passive joint (equation 3.12 of the thesis): the laws that a joint of a model states."""
 _NO_LAWS = ("segment", "muscle")
-"""Families of joint effects that say nothing of how a passive joint resists."""
+"""Families of joint effects that are not passive resistance of a joint."""
 
 
 def effects_of(model: Model, with_effects: Sequence[str] | None) -> tuple[list[Effect], list[bool]]:
-    """Return the effects of a model with those wanted, or with passive laws where joints have none, and which of them are fitted."""
+    """Return the effects of a model with those requested, or with passive laws where joints have none, and which of them are fitted."""
     wanted = None if with_effects is None else checks.texts("with_effects", with_effects, "kinds of effects")
     effects = [*model.all_effects, *(_passive_laws(model) if wanted is None else _added(model, wanted))]
     return effects, [e.kind in _joint_kinds() for e in effects]
@@ -461,7 +461,7 @@ def _passive_laws(model: Model) -> list[Effect]:
 
 @dataclass(frozen=True)
 class CoreSettings:
-    """What the core has to know besides the trials: the model as given, which effects of the rig are fitted, and what `identify` takes."""
+    """Input of the core besides the trials: the model as given, which effects of the rig are fitted, and arguments of `identify`."""
 
     model: Model
     fitted: list[bool]
@@ -474,7 +474,7 @@ class CoreSettings:
 
 
 _FAR = 2.0
-"""A calibration this many times its tolerance, which is its standard deviation beforehand, may stand for something else."""
+"""A calibration this many times its tolerance, which is its prior standard deviation, may represent another error."""
 _BEYOND = 5.0
 """A calibration this many times its tolerance is no calibration."""
 _WIDE = 0.25
@@ -493,7 +493,7 @@ def _contradictions(parameters: Sequence[Estimate]) -> tuple[str, ...]:
 
 
 def _alone(dataset: Dataset, parameters: Sequence[Estimate]) -> tuple[str, ...]:
-    """Return that one trial was fitted, which tells nothing of what repeats differ by, with the joint laws whose intervals are wide."""
+    """Return that one trial was fitted, so that the scatter of repeats is unknown, with the joint laws whose intervals are wide."""
     if len(dataset.fit_trials) != 1:
         return ()
     laws = [e for e in parameters if e.kind != "segment" and e.decided_by == "data" and e.std > _WIDE * abs(e.value)]
@@ -506,7 +506,7 @@ def _alone(dataset: Dataset, parameters: Sequence[Estimate]) -> tuple[str, ...]:
 
 
 def _beyond_segment(model: Model, parameters: Sequence[Estimate]) -> tuple[str, ...]:
-    """Return the centres of mass that the cascade, which knows no such limit, puts beyond the end of their segment, a line each."""
+    """Return the centres of mass that the cascade, which has no such limit, puts beyond the end of their segment, a line each."""
     lines = []
     for e in parameters:
         length = model.segments[(e.joint or 1) - 1].length
@@ -519,7 +519,7 @@ def _beyond_segment(model: Model, parameters: Sequence[Estimate]) -> tuple[str, 
 
 
 def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: Tolerance, above: float, to: float) -> tuple[str, ...]:
-    """Return the calibrations that came out larger than promised, more than `above` and up to `to` times, a line each."""
+    """Return the calibrations larger than their tolerance, more than `above` and up to `to` times, a line each."""
     lines = []
     for e in calibration:
         promised = _promised(e, tolerance)
@@ -532,8 +532,8 @@ def _beyond_tolerance(calibration: Sequence[Estimate], tolerance: Tolerance, abo
 def _moved_by_data(calibration: Sequence[Estimate], tolerance: Tolerance) -> tuple[Estimate, ...]:
     """Return the calibration with what the data pulled far beyond its tolerance decided by them.
 
-    Where the model does not fit, standard deviations are as wide as the tolerance, which says that the data decided nothing. The value
-    itself says the contrary: beforehand it was zero.
+    Where the model does not fit, standard deviations are as wide as the tolerance, as if the data decided nothing. The value
+    itself contradicts that: its prior mean is zero.
     """
     return tuple(e.replace(decided_by="data") if abs(e.value) > _FAR * _promised(e, tolerance) else e for e in calibration)
 
@@ -573,7 +573,7 @@ def _joint_kinds() -> dict[str, Any]:
 
 
 def _added(model: Model, kinds: Sequence[str]) -> list[Effect]:
-    """Return an effect of every wanted kind at every joint where the model has none yet."""
+    """Return an effect of every requested kind at every joint where the model has none yet."""
     known = _joint_kinds()
     present = {(e.kind, e.joint) for e in model.all_effects}
     added = []

@@ -1,4 +1,4 @@
-"""A first data set and model of a person, from what a tape measure and a scale tell."""
+"""A first data set and model of a person, from lengths, height and body mass."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ AT_END = 1.0
 
 @dataclass(frozen=True)
 class Interaction:
-    """How the handle answers a force, in y and z alike.
+    """How the handle responds to a force, in y and z alike.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Interaction:
     link_masses_kg : (float, float)
         Of the robot's links, uniform rods, beside the inertia of its motors.
     hold_s : float
-        Time at rest after the movement, in which stability is judged.
+        Time at rest after the movement, in which stability is checked.
     """
 
     law: str = "impedance"
@@ -119,7 +119,7 @@ class Perturbation:
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """Motors in the joints of an orthosis that carry the arm as `armrs_compensation_carry` tells.
+    """Motors in the joints of an orthosis that carry the arm with the torques of `armrs_compensation_carry`.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ class Support:
 
 @dataclass(frozen=True, eq=False)
 class EndpointImpedance:
-    """What the arm's tip answers a displacement with: `F = K x + D ẋ + M ẍ`, as fitted to a perturbation.
+    """Impedance of the arm's tip: `F = K x + D ẋ + M ẍ`, as fitted to a perturbation.
 
     Attributes
     ----------

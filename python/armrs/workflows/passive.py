@@ -36,7 +36,7 @@ from .setup import find_wrong_setup
 DEFAULT_CUTOFF = 1.0
 """Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
 LEAST_CUTOFF = 1e-3
-"""Nobody moves slower [Hz]."""
+"""No arm moves slower [Hz]."""
 DEFAULT_BINS = 24
 """Angle bins over the range of a joint in one configuration."""
 MARGIN = 0.43
@@ -46,7 +46,7 @@ APART = np.radians(10.0)
 CARRIED = (0.05, 20.0)
 """The force carries an arm that is led: its torque along that of the weight, relative to that. Outside of this, unit or side are wrong."""
 LEAST_WEIGHT = 0.5
-"""Torque of the weight from which on that is asked [N m]."""
+"""Torque of the weight from which on that is checked [N m]."""
 RESTING = 0.02
 """A joint rests when its speed is below this part of its usual speed in the trial."""
 LEVEL = 0.95
@@ -209,7 +209,7 @@ class PassiveMoments(Tabular):
     dependence : tuple of Dependence
         For every joint that moved while an adjacent one was held at different angles: the elastic moment as a function of both.
     couplings : tuple of Coupling
-        For every pair of joints that were each moved while the other was held: what both say of their coupling.
+        For every pair of joints that were each moved while the other was held: their coupling from both.
     checks : tuple of Check
         Whether the muscles were silent and the movement slow.
     """
@@ -297,7 +297,7 @@ def passive_moments(
     """Compute the passive moment of every joint in slow movements, and its elastic and dissipative parts.
 
     `tau_p = J(q)^T F_on_arm - G(q) - B(q) qdd - C(q, qd) qd`, plus joint torques where they were measured: equation 3.18 of the thesis
-    with the force on the arm. The thesis neglects inertial torques; here they are taken off by the model, and a check says where they are
+    with the force on the arm. The thesis neglects inertial torques; here they are subtracted by the model; a check states where they are
     not small. Only the rigid arm of the model counts, with what was worn, and none of its effects.
 
     Parameters
@@ -362,7 +362,7 @@ def passive_moments(
 
 
 def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[TrialMoments, ...], list[str]]:
-    """Return trials in which first cycles that resist more than later ones tell no direction, and a line for each."""
+    """Return trials without the direction of first cycles that resist more than later ones, and a line for each."""
     kept, lines = list(trials), []
     for configuration in dict.fromkeys(m.trial.configuration for m in trials):
         own = [k for k, m in enumerate(trials) if m.trial.configuration == configuration]
@@ -531,7 +531,7 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependen
 
 
 def _led_by(curve: PassiveCurve) -> bool:
-    """Whether the joint moves far enough to tell a shape."""
+    """Whether the joint moves far enough to determine a shape."""
     return bool(np.ptp(curve.angle) > joint_coupling.LEAST_HELD)
 
 
@@ -572,7 +572,7 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
     telling = [m for m in repeats if m.direction.any()]
     for m in repeats:
         there = np.isfinite(m.moment).all(axis=1)
-        # Where no repeat tells, it is the movement and not a sensor, and that its joints are left out says so.
+        # Where no repeat has a direction, the movement is the cause and not a sensor, and a line on its joints states that.
         if telling and not m.direction.any():
             lines.append(
                 f"{m.trial.file}: no joint moves long enough to tell its direction: the trial is not used (wrong unit, or a dead sensor?)"

@@ -41,7 +41,7 @@ class Instruments:
     angle : float
         Standard deviation of a single angle sample [rad].
     tolerance : Tolerance
-        What the calibration promises.
+        Tolerances of the calibration.
     """
 
     rate: float = 50.0
@@ -107,7 +107,7 @@ class Limits:
         checks.number("robot_acceleration", self.robot_acceleration, above=0.0, most=1e4, unit="rad/s²")
         checks.number("force", self.force, above=0.0, most=1e4, unit="N")
         checks.number("duration", self.duration, above=0.0, most=600.0, unit="s")
-        # A movement that takes for ever is simulated before anything can say that it is too long.
+        # A movement is simulated before its duration is checked, which must not be endless.
         for name, unit, least in (
             ("speed", "rad/s", LEAST_TURN / self.duration),
             ("acceleration", "rad/s²", 4.0 * LEAST_TURN / self.duration**2),
@@ -130,7 +130,7 @@ class Plan(Tabular):
     repeats : int
         Trials of each.
     forecast : Forecast
-        What they will show, and what they ask of the robot; its attributes are those of the plan as well.
+        Certainty of the parameters and load of the robot; its attributes are those of the plan as well.
     model : Model
     slowed : tuple of Slowed
         The movements that had to be slowed for a limit.
@@ -220,7 +220,7 @@ def forecast(
     with_effects: Sequence[str] | None = None,
     instruments: Instruments = Instruments(),
 ) -> Plan:
-    """Say before an experiment how well movements will show the parameters of an arm.
+    """Predict before an experiment how well movements determine the parameters of an arm.
 
     Parameters
     ----------
@@ -244,14 +244,14 @@ def forecast(
     BadInput
         For a movement that the robot cannot make and settings out of range.
     IdentificationError
-        When nothing can be said.
+        When no prediction is possible.
 
     Notes
     -----
     The closed chain is simulated, noise of the sensors is carried through the rows of the regression and the prior of the
     model, as `identify` would have them. Nothing is measured: what the model lacks is not in it. Over 200 repetitions with two
     segments the scatter was 0.90 to 1.09 of the deviations; over 100 with three, where the robot does not hold every joint, 0.84 to
-    1.03, which such numbers of repetitions tell to 5 and 7 % (`scripts/check_plan.py 200` and `100 300 3 601`). With three segments and
+    1.03, accurate to 5 and 7 % with so many repetitions (`scripts/check_plan.py 200` and `100 300 3 601`). With three segments and
     five repeats two deviations of the hand's first moment are 2.1 % of it and of its second moment 4.9 %. With ten they are 1.5 and
     3.5 %: of 200 repetitions 95 % were within 1.6 and 3.5 %, and the scatter was 0.97 to 1.17 of the deviations.
 
@@ -275,7 +275,7 @@ def forecast(
             movements, interruptible.call(_armrs.forecast, asked.rig, asked.settings, instruments, (movements, asked.repeats))
         )
     except BadInput as error:
-        # Of several movements nobody says which it was.
+        # Of several movements it is unknown which it was.
         raise about(movements[0], error) if len(movements) == 1 else error from None
 
 
@@ -319,9 +319,9 @@ def plan(
     ------
     BadInput
         For settings out of range, and for limits that no movement that was tried respects, even slowed: to the longest trial allowed, or
-        a tenth of the speed asked for. It names the limit, what the nearest movement takes, and what is allowed.
+        a tenth of the requested speed. It names the limit, what the nearest movement takes, and what is allowed.
     IdentificationError
-        When the movements that respect the limits cannot tell the parameters apart.
+        When the movements that respect the limits cannot distinguish the parameters.
     """
     asked = _Question(model, with_effects, instruments, repeats)
     checks.instance("limits", limits, Limits)
@@ -385,7 +385,7 @@ def write_movements(found: Plan, data: dict[str, Any], folder: Path) -> list[Pat
 
 
 class _Question:
-    """What forecast and plan ask of the core."""
+    """Input of forecast and plan for the core."""
 
     def __init__(self, model: Model, with_effects: Sequence[str] | None, instruments: Instruments, repeats: int) -> None:
         checks.instance("model", model, Model)

@@ -31,7 +31,7 @@ _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
 def plan_stretches(
     model: Model, limits: Limits, joint: int, *, speeds: int = 5, repeats: int = 3, instruments: Instruments | None = None
 ) -> Plan:
-    """Propose stretches of one joint at speeds from slow to as fast as the limits allow, and say how well they will show its reflex.
+    """Propose stretches of one joint at speeds from slow to as fast as the limits allow, and predict how well they will show its reflex.
 
     Parameters
     ----------

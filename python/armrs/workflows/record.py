@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 RECORDING_RATE = 500.0
 """Samples a second of the simulation, from which the devices take theirs [Hz]."""
 LONGEST = 3600.0
-"""Of a trial [s]: nobody holds still for longer, and what is recorded would fill the memory."""
+"""Longest trial [s]: no subject holds still for longer, and the recording would fill the memory."""
 GAP = 0.1
 """Length of a gap of a hidden marker [s]."""
 EMG_REST, EMG_GAIN = 3.0, 20.0
@@ -191,7 +191,7 @@ def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done
 
 
 def check_required(experiment: Experiment) -> None:
-    """Refuse movements that ask more of the robot than its supervisor allows."""
+    """Refuse movements beyond the limits of the robot's supervisor."""
     safety = experiment.safety
     for number, run in enumerate(experiment.runs, start=1):
         place = f"[[movement]] {number} ({run.configuration})"
@@ -392,7 +392,7 @@ class _Session:
         return trial if len(stamps) >= FEWEST_SAMPLES else None, markers
 
     def _markers(self, model: Model, t: np.ndarray, q: np.ndarray, draw: np.random.Generator) -> Markers:
-        """Return what the cameras see of the joints: positions in x (normal to the plane), y, z [m]."""
+        """Return the positions of the joints as the cameras measure them: x (normal to the plane), y, z [m]."""
         absolute = np.cumsum(q, axis=1)
         at = np.tile(np.array(model.base), (len(t), 1))
         points = [at]

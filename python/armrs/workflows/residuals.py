@@ -28,7 +28,7 @@ class Explained:
     t : ndarray, shape (m,)
         Times of the samples that were used [s].
     measured, fitted : ndarray, shape (m, n_joints)
-        Joint torques that the measurement asks for, and those of the fitted model [N m].
+        Joint torques that follow from the measurement, and those of the fitted model [N m].
     """
 
     trial: Trial

@@ -20,9 +20,9 @@ from ..model import Model
 from ..report.tables import plus_minus
 
 _UNEXPLAINED = 0.04
-"""Share of the contact torques that gravity and passive joints leave, from which on another reading is looked for."""
+"""Share of the contact torques that gravity and passive joints leave, from which on another reading is searched for."""
 _MIXED = 0.08
-"""And from which on single trials are asked, where no reading of all together is better."""
+"""And from which on single trials are checked, where no reading of all together is better."""
 _BETTER = 2.0
 """Another reading is named that leaves so many times less; in the right setup the best leaves at most 1.2 times less (128 sessions of two
 worlds with up to two hidden effects)."""
@@ -43,7 +43,7 @@ _UNPROVED = 1.5
 """A reading that leaves less than this many times what the given one does is not excluded (in the right setup forces read otherwise leave
 3 times as much, and angles of shoulder and elbow: 22 sessions of two worlds; a mirrored wrist 1.2 to 2.4 times)."""
 _OTHER_WEIGHT, _MUCH_HEAVIER = 2.0, 0.1
-"""Another weight is told from so many standard deviations on, and from this part of the weight on: 42 right sessions of two worlds lie
+"""Another weight is reported from so many standard deviations on, and from this part of the weight on: 42 right sessions of two worlds lie
 within both (factors 0.85 to 1.10)."""
 _FEW = 3
 """Movements from which on their differences, and not those of trials, are the scatter of the weight."""
@@ -52,7 +52,7 @@ _UNITS = {"lbf": 4.4482216, "kgf": 9.80665}
 _SAME_UNIT = 0.3
 """A factor this close to that of a unit suggests it: literature and springs are wrong by as much."""
 _STEPS = (np.radians(10.0), np.radians(1.0))
-"""Steps in which another zero of an angle is looked for [rad]."""
+"""Steps of the search for another zero of an angle [rad]."""
 
 
 def examine_setup(dataset: Dataset) -> list[str]:
@@ -89,7 +89,7 @@ def first_wrong(model: Model, trials: Sequence[Trial], *, met: bool) -> BadInput
     motion = _motion(trials)
     if motion is None or (together is None and unexplained(model, motion) <= _MIXED):
         return None
-    # More than half of the trials are no exceptions: nobody asks the others then.
+    # More than half of the trials are no exceptions: the others are not checked then.
     alone = dict(islice(((found.file, found) for found in wrong_trials(model, trials, met=met)), len(trials) // 2 + 1))
     rest = _motion([t for t in trials if t.file not in alone])
     if 0 < 2 * len(alone) <= len(trials) and rest is not None and unexplained(model, rest) < _UNEXPLAINED:
@@ -121,7 +121,7 @@ def wrong_setup(model: Model, trials: Sequence[Trial], *, met: bool, alone: bool
     met : bool
         Whether the angles are known to be right, since they put the hand where the robot's put its handle.
     alone : bool
-        Whether these are few of the trials, which must then be clearly wrong; no other zero of one angle is looked for.
+        Whether these are few of the trials, which must then be clearly wrong; no other zero of one angle is searched for.
     """
     motion = _motion(trials, _SAMPLES_ALONE if alone else SAMPLES)
     if motion is None:
@@ -176,7 +176,7 @@ class Weight:
 
 
 def other_weight(dataset: Dataset) -> Weight | None:
-    """Return how heavy the arm is, where that contradicts the masses of the model; None where it does not, or cannot be told."""
+    """Return how heavy the arm is, where that contradicts the masses of the model; None where it does not, or cannot be determined."""
     model, trials = dataset.model, balanced_trials(dataset)
     if model.gravity == 0.0 or dataset.added:
         return None
@@ -194,7 +194,7 @@ def other_weight(dataset: Dataset) -> Weight | None:
 
 
 def _unproved(model: Model, motion: Motion, *, met: bool) -> list[str]:
-    """Return which readings of the columns the forces do not tell from the given one, in one line."""
+    """Return which readings of the columns the forces do not distinguish from the given one, in one line."""
     given = unexplained(model, motion)
     near = [one for one in _ranked(model, motion, met) if one[0] < _UNPROVED * given]
     zero = None if met else _other_zero(model, motion)

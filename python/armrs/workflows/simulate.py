@@ -98,7 +98,7 @@ class Sensors:
 
 
 class Run(Protocol):
-    """A recorded run, whole or streamed: what it takes to say what came out, and to draw and write it."""
+    """A recorded run, whole or streamed: what its summary, figures and files are made from."""
 
     @property
     def model(self) -> Model:
@@ -214,7 +214,7 @@ class Simulated(Doubted, Tabular, Series):
 
     @cached_property
     def digest(self) -> str:
-        """Digest of the recorded bits; the same on every machine. Computed when it is first asked for."""
+        """Digest of the recorded bits; the same on every machine. Computed at the first access."""
         digest = _armrs.Digest(self.columns["effects"])
         for name in digested(self.columns):
             values = self.columns[name]
@@ -242,12 +242,12 @@ class Simulated(Doubted, Tabular, Series):
 
 
 def digested(columns: Mapping[str, Any]) -> list[str]:
-    """Return the names of the columns that a digest stands for, in its order."""
+    """Return the names of the columns of a digest, in its order."""
     return [name for name in columns if name not in ("effects", "energy_error")]
 
 
 def is_doubtful(run: Run) -> str | None:
-    """Return why a run has to be compared with one of half the step; None where nothing asks for it.
+    """Return why a run has to be compared with one of half the step; None where that is not needed.
 
     Rapier does not locate where set-valued friction sticks and slips. Smooth friction whose slope at rest is too steep for the step
     chatters, and loses energy while it does: at 1e-5 of what is exchanged the force is off by up to 0.2 %.
@@ -316,7 +316,7 @@ def simulate(
         steep for 0.25 ms is set-valued: `smoothing` is 0 there in `model` of the run.
     accuracy : float, optional
         Largest error of a recorded angle against ever shorter steps [rad], instead of `dt`: of the fourth-order method, by comparing runs.
-        The step is 1/rate divided by a whole number, 1e-6 s or more; `settings` of the run tell it and the estimated error.
+        The step is 1/rate divided by a whole number, 1e-6 s or more; `settings` of the run hold it and the estimated error.
     rate : float, optional
         Samples a second that are recorded [Hz]; 1/rate must be a whole number of steps. Sensors read this recording at a rate of their own,
         `sensors.rate`, which may not be larger: what is in between is not recorded. When absent, 50 Hz, or that of faster sensors.
@@ -363,7 +363,7 @@ def simulate(
 
 
 def _run(asked: _Asked, accuracy: float | None, sensing: tuple[Sensors, list[int]] | None) -> Simulated:
-    """Return a run with the step that is asked for, or with one that keeps an accuracy."""
+    """Return a run with the requested step, or with one that keeps an accuracy."""
     rig = _armrs.Rig(asked.model)
     with asked.about_drive():
         if accuracy is None:
@@ -456,7 +456,7 @@ class _Asked:
 
     @contextlib.contextmanager
     def about_drive(self) -> Iterator[None]:
-        """Say of a refusal of the core which file it is about."""
+        """Name the file that a refusal of the core is about."""
         try:
             yield
         except BadInput as error:
@@ -525,7 +525,7 @@ def _asked(
 
 
 def _integrator(given: str | None, engine: str) -> str:
-    """Return the integrator of a run; rapier has its own, and one that is asked for would be ignored."""
+    """Return the integrator of a run; rapier has its own, and a requested one would be ignored."""
     if given is None:
         return "rk4"
     if engine == "rapier":
@@ -534,7 +534,7 @@ def _integrator(given: str | None, engine: str) -> str:
 
 
 def _clock(dt: float, rate: float) -> Text:
-    """Return step and rate together: which of them is meant to change, a refusal cannot know."""
+    """Return step and rate together, as either may have to change."""
     return Text(f"a step of {dt:g} s and {rate:g} Hz")
 
 

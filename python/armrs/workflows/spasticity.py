@@ -30,17 +30,17 @@ from .passive import TrialMoments, trial_moments
 DEFAULT_CUTOFF = 4.0
 """Cutoff of the low-pass [Hz]: above it, inertia times the noise of angles would be taken for latency (0.05° gave 6 ms at 8 Hz)."""
 FINER = 3.0
-"""How much higher the cutoff of the motion is that the reflex is told: a low-pass before its threshold would not be undone by one after."""
+"""Ratio of the cutoff of the reflex's input motion to that: a low-pass before its threshold has another effect than one after."""
 FINER_WITH_ROBOT = 10.0
-"""The same where the angles of the robot say the fast motion: they have little noise (`armrs.analysis.robot_motion`)."""
+"""The same where the fast motion is from the angles of the robot: they have little noise (`armrs.analysis.robot_motion`)."""
 FINEST = 25.0
-"""Samples that are looked at in each period of the cutoff: those of the finer motion are not to be lost."""
+"""Samples in each period of the cutoff, enough for the finer motion."""
 EDGE = 1.0
-"""Periods of the cutoff at both ends of a trial that are not fitted: the low-pass knows one side of them only."""
+"""Periods of the cutoff at both ends of a trial that are not fitted: the low-pass has one side of them only."""
 LEAST_SPEEDS = 1.5
-"""The fastest stretch must be faster than the slowest by this factor before a reflex can be told from viscosity."""
+"""The fastest stretch must be faster than the slowest by this factor before a reflex can be distinguished from viscosity."""
 CATCH_SHARE = 0.1
-"""Share of its largest moment in a stretch from which on the reflex counts as felt: the catch."""
+"""Share of its largest moment in a stretch from which on the reflex counts as begun: the catch."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +57,13 @@ class StretchSeen:
     elastic, resisting, reflex : float
         Their largest shares of the moment: springs; viscosity and friction; reflex [N m].
     catch_angle, catch_speed : float
-        Where the reflex began to be felt [rad, rad/s]; NaN where it was not.
+        Where the catch began [rad, rad/s]; NaN without one.
     emg_onset : float
         Time from the start of the stretch to the first activity of a muscle [s]; NaN without one.
     emg_latency : float
         Time from the speed's passing the threshold to that activity [s]; NaN as above.
     co_contraction : float
-        How much antagonists work against one another, 0 to 1; NaN where no pair of them is recorded, see `armrs.io.muscle_activity`.
+        Co-contraction of antagonists, 0 to 1; NaN where no pair of them is recorded, see `armrs.io.muscle_activity`.
     """
 
     file: str
@@ -101,7 +101,7 @@ class JointReflex:
 
 @dataclass(frozen=True, eq=False)
 class Spasticity(Tabular):
-    """What stretches at several speeds say of the reflexes of an arm.
+    """The reflexes of an arm from stretches at several speeds.
 
     Attributes
     ----------
@@ -211,11 +211,11 @@ def spasticity(
     dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     slowest = min(trial.rate for trial in dataset.trials)
     cutoff = checks.number("cutoff", cutoff, above=0.0, unit="Hz")
-    # A slow recording is not refused for a default: it is asked with what it holds.
+    # A slow recording is not refused for a default: the cutoff is lowered.
     cutoff = min(cutoff, 0.4 * slowest)
     tell = checks.progress(progress)
     refuse_implausible(dataset)
-    # Activity of the muscles is what is looked for here: samples with it count.
+    # Samples with muscle activity count here.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
     # Torques of the contact are products of forces with angles: the low-pass comes after them.
     moments = [_moments(dataset, trial, cutoff) for trial in whole]
@@ -331,7 +331,7 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
 
 
 def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
-    """Return what speaks against a reflex that was found."""
+    """Return evidence against a reflex that was found."""
     threshold, latency = (fitted.parameters[key] for key in ("threshold", "latency"))
     said = []
     if not fitted.found:

@@ -108,7 +108,7 @@ def _arrays(piece: Simulated) -> dict[str, np.ndarray]:
 def stream(
     model: Model, drive: Movement | Trial | None, near: Path | None = None, *, accuracy: float | None = None, **options: Any
 ) -> Iterator[Streamed]:
-    """Simulate a run of any length, as long as it is looked at.
+    """Simulate a run of any length, while pieces of it are consumed.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ use crate::Scalar;
 /// Position of the ratio among the parameters.
 const RATIO: usize = 1;
 /// What a search assumes of it, and the standard deviation of that: a muscle pulls with about the same arm at both joints. With springs in
-/// both joints no movement tells it: three stiffnesses of two joints follow from four numbers.
+/// both joints no movement determines it: three stiffnesses of two joints follow from four numbers.
 const EXPECTED_RATIO: [f64; 2] = [1.0, 0.3];
 
 /// A spring over two adjacent joints, as of a muscle that crosses both; its joint is the distal one.

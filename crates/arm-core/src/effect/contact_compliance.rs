@@ -4,7 +4,7 @@ use crate::{Scalar, Setup};
 
 /// Compliance of hand and handle beyond that of the model, in series with it.
 ///
-/// The contact becomes at most a hundred times stiffer, whatever a negative value asks for.
+/// The contact becomes at most a hundred times stiffer at any negative value.
 pub struct ContactCompliance;
 
 impl Law for ContactCompliance {

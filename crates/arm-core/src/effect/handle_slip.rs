@@ -2,7 +2,7 @@ use super::law::{Info, Law, Parameter, Parameters, Place};
 use super::prior::{Nature, Part, Prior};
 use crate::{Scalar, Setup};
 
-/// A handle that slips in the hand once and stays there: the hand then stands further than the robot's angles say.
+/// A handle that slips in the hand once and stays there: the hand is then further than by the robot's angles.
 ///
 /// With several of these the ways add; the last one states the start.
 pub struct HandleSlip;

@@ -81,7 +81,7 @@ impl Parameter {
     }
 }
 
-/// What the catalogue says of a kind.
+/// The entry of a kind in the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
     /// Stable name in models, reports and JSON.
@@ -100,7 +100,7 @@ pub struct Info {
     pub states: usize,
 }
 
-/// What a joint effect sees: one joint at one instant.
+/// Input of a joint effect: one joint at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Local<T> {
     /// Time since the start of the trial \[s\].
@@ -138,7 +138,7 @@ impl<T: Scalar> Local<T> {
     }
 }
 
-/// What an effect acts on, and so who can apply it: a controller that knows only the arm applies the first two.
+/// What an effect acts on, and so where it can be applied: a controller with a model of the arm alone applies the first two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ActsOn {
@@ -157,7 +157,7 @@ impl ActsOn {
     pub(super) const fn joints(self, place: Place) -> bool {
         matches!((self, place), (Self::Joints, _) | (_, Place::Joint))
     }
-    /// What an effect at a place acts on unless its law says otherwise.
+    /// What an effect at a place acts on unless its law sets something else.
     const fn at(place: Place) -> Self {
         match place {
             Place::Joint => Self::Joints,
@@ -174,9 +174,9 @@ pub trait Law {
     const INFO: Info;
     /// Whether it acts in the joint before as well, by [`Law::proximal_share`].
     const CROSSES: bool = false;
-    /// Whether it looks at [`Local::joint_force`].
+    /// Whether it depends on [`Local::joint_force`].
     const FEELS_FORCE: bool = false;
-    /// Whether it looks at [`Local::activity`].
+    /// Whether it depends on [`Local::activity`].
     const FEELS_ACTIVITY: bool = false;
     /// What it is called in a sentence, where that is not its kind with spaces.
     const TITLE: Option<&'static str> = None;

@@ -8,7 +8,7 @@
 //! catalogue is an `OwnLaw` (feature `own`).
 
 mod law;
-// Firmware knows the catalogue alone, and pays nothing for what cannot be declared there.
+// Firmware has the catalogue alone, without code for declared kinds.
 #[cfg_attr(not(feature = "own"), path = "own_absent.rs")]
 mod own;
 mod place;
@@ -84,11 +84,11 @@ macro_rules! catalogue {
             pub fn feels_force(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Own(own) => own.feels_force() }
             }
-            /// Whether it depends on the activity of muscles, which something must tell.
+            /// Whether it depends on the activity of muscles, which must be given.
             pub const fn feels_activity(self) -> bool {
                 match self { $(Self::$law => <$module::$law as Law>::FEELS_ACTIVITY,)* Self::Own(_) => false }
             }
-            /// Whether it acts on the rig or the sensors, or depends on what nothing tells of an arm by itself.
+            /// Whether it acts on the rig or the sensors, or depends on more than the motion of an arm.
             pub fn needs_more_than_an_arm(self) -> bool {
                 matches!(self.acts_on(), ActsOn::Rig | ActsOn::Sensors) || self.feels_activity()
             }
@@ -180,7 +180,7 @@ macro_rules! catalogue {
             /// Adds the torque with which the joints of a moving arm resist; nothing for an index beyond the arm.
             #[inline]
             fn resist<const N: usize>(&self, motion: &Motion<T, N>, memory: States<T>, total: &mut Joints<T, N>) {
-                // The view of the joint is made within each arm, so that a kind pays only for what it looks at.
+                // `Local` is made within each branch, so that only what a kind uses is computed.
                 match self.kind {
                     $(Kind::$law => {
                         let torque = $module::$law::torque(&self.parameters, &motion.local(self.index, memory));
@@ -265,7 +265,7 @@ const fn linear_parameters(parameters: &[Parameter]) -> usize {
     count
 }
 
-/// An entry of the catalogue, its prose only where that is wanted.
+/// An entry of the catalogue, with its text only where that is compiled in.
 const fn listed(info: Info) -> Info {
     if cfg!(feature = "prose") {
         return info;
@@ -395,7 +395,7 @@ impl<T: Scalar> Effect<T> {
     }
 }
 
-/// A motion of the whole arm at one instant, as joint effects see it.
+/// A motion of the whole arm at one instant, the input of joint effects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion<T, const N: usize> {
     /// Time since the start of the trial \[s\].
@@ -431,7 +431,7 @@ impl<T: Scalar, const N: usize> Motion<T, N> {
         self
     }
 
-    /// What an effect at a joint sees; zero for an index beyond the arm.
+    /// Input of an effect at a joint; zero for an index beyond the arm.
     #[inline]
     pub fn local(&self, joint: usize, memory: States<T>) -> Local<T> {
         let at = |values: &[T]| values.get(joint).copied().unwrap_or(T::ZERO);

@@ -51,7 +51,7 @@ pub trait OwnLaw: Sync {
     fn prior(&self) -> Prior {
         Prior::FIRST
     }
-    /// Whether it looks at [`Local::joint_force`].
+    /// Whether it depends on [`Local::joint_force`].
     fn feels_force(&self) -> bool {
         false
     }

@@ -10,9 +10,9 @@ pub struct Prior {
     pub parts: &'static [Part],
     /// How it comes and goes.
     pub nature: Nature,
-    /// What of it the calibration of a rig promises to be small.
+    /// What of it is within the tolerance of a rig's calibration.
     pub promise: Option<Promise>,
-    /// Share of what it shows (as a sum of squares) that its law may miss: much for laws that stand for a family of shapes.
+    /// Possible error of its law, as a share of its sum of squares: large for laws that represent a family of shapes.
     pub missed: f64,
     /// Its family, where its place does not decide it.
     pub family: Option<Family>,
@@ -24,7 +24,7 @@ pub struct Prior {
     pub frequencies: [f64; 2],
 }
 
-/// Effects of one mechanism, of which movements may not tell the members apart.
+/// Effects of one mechanism, whose members may be indistinguishable by movements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Dry friction.
@@ -97,7 +97,7 @@ impl Nature {
     }
 }
 
-/// A promise of the calibration, see the table `[tolerance]` of a data set.
+/// A tolerance of the calibration, see the table `[tolerance]` of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
     /// Offsets of joint angles.
@@ -123,7 +123,7 @@ pub struct Part {
     pub varying: &'static [usize],
     /// What is known of a shape, where something is: its position, expected value and standard deviation.
     pub expected: &'static [(usize, [f64; 2])],
-    /// Change of a size that is small and yet seen; zero where the size of the torque tells it.
+    /// Small change of a size that is still visible; zero where it follows from the size of the torque.
     pub small: f64,
 }
 
@@ -210,7 +210,7 @@ impl Prior {
         Self { missed, ..self }
     }
 
-    /// What the calibration promises to be small.
+    /// What is within the tolerance of the calibration.
     pub const fn promised(self, promise: Promise) -> Self {
         Self {
             promise: Some(promise),

@@ -76,7 +76,7 @@ impl<T: Scalar, const N: usize, const P: usize> Needed<T, N, P> {
         self.torque_of(|i| unknowns[i])
     }
 
-    /// The same of values that are asked for by the number of the unknown.
+    /// The same of values by the number of the unknown.
     #[inline]
     pub(crate) fn torque_of(&self, unknown: impl Fn(usize) -> T) -> Joints<T, N> {
         let mut sums = self.known;
@@ -158,10 +158,6 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     pub fn effects(&self) -> &[Effect<T>; E] {
         &self.effects
     }
-    /// Whether an effect depends on the forces through the joints; otherwise they need not be computed.
-    pub fn feels_force(&self) -> bool {
-        self.feels_force
-    }
     /// Whether some effect has states of its own, which [`Equation::advance`] carries on.
     pub fn remembers(&self) -> bool {
         self.remembers
@@ -171,7 +167,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         self.used
     }
 
-    /// What the arm as given says of its unknowns: base parameters from masses, centres of mass and inertias that are
+    /// Priors of the unknowns from the arm as given: base parameters from masses, centres of mass and inertias that are
     /// each uncertain by a relative standard deviation, effects about their values and otherwise open.
     pub fn priors(&self, uncertainty: T) -> [Prior<T>; P] {
         let infinite = T::of(f64::INFINITY);
@@ -223,40 +219,8 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         priors
     }
 
-    /// The arm and the effects with values in place of the unknowns.
-    ///
-    /// Of a chain only base parameters are known; the masses stay as they are, and centres of mass and inertias are
-    /// moved so that the base parameters come out. Their gravity and motion are exact, the force in a bearing is not.
-    pub fn with_values(&self, values: &[T; P]) -> (Chain<T, N>, [Effect<T>; E]) {
-        let (mut chain, mut effects) = (self.chain, self.effects);
-        let mut next = values.iter();
-        for second in [false, true] {
-            for j in 0..N {
-                let Some(&value) = next.next() else { continue };
-                let s = &mut chain.segments[j];
-                if second {
-                    s.inertia += value - chain.j[j];
-                    chain.j[j] = value;
-                } else {
-                    let along = s.com[0] + (value - chain.x[j]) / s.mass;
-                    s.inertia += s.mass * (s.com[0].squared() - along.squared());
-                    s.com[0] = along;
-                    chain.x[j] = value;
-                }
-            }
-        }
-        // What is linear comes first.
-        for effect in effects.iter_mut().filter(|e| e.on) {
-            let count = linear(effect).count();
-            for (value, &new) in effect.parameters.iter_mut().take(count).zip(&mut next) {
-                *value = new;
-            }
-        }
-        (chain, effects)
-    }
-
     /// The states of the effects one period later, the motion taken as constant in it.
-    /// No period and no speed makes a state run away, see [`advance_states`].
+    /// A state stays bounded at any period and speed, see [`advance_states`].
     pub fn advance(&self, motion: &Motion<T, N>, memory: &mut [States<T>; E], period: T) {
         if self.remembers {
             advance_states(&self.effects, (motion, motion), memory, period);

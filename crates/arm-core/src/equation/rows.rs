@@ -98,7 +98,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         });
     }
 
-    /// The motion with what effects feel of the forces through the joints.
+    /// The motion with the forces through the joints that act on effects.
     #[inline(never)]
     pub(super) fn loaded(
         &self,

@@ -1,4 +1,4 @@
-//! What an estimator says of the unknowns, and of itself.
+//! Estimates of the unknowns, and the state of an estimator.
 
 use super::sample::SampleStatus;
 use crate::equation::Prior;
@@ -9,7 +9,7 @@ use crate::scalar::Real;
 pub enum Decision {
     /// The data.
     Data,
-    /// What was assumed beforehand: the data leave it open.
+    /// The prior: the data do not determine it.
     Prior,
     /// A bound that the data push against.
     Bound,
@@ -61,10 +61,5 @@ impl<T: Real> Estimate<T> {
             sd: p.sd,
             decided_by: Decision::Prior,
         }
-    }
-
-    /// The interval of so many standard deviations, cut at the bounds.
-    pub fn interval(&self, deviations: T, prior: &Prior<T>) -> [T; 2] {
-        [-deviations, deviations].map(|k| (self.value + k * self.sd).max(prior.min).min(prior.max))
     }
 }

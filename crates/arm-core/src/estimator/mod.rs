@@ -86,7 +86,7 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     /// The last that was solved for.
     solution: [T; P],
     prior_row: usize,
-    /// Running means of squared residuals and of products of neighbouring ones, in units of the noise; windows that were judged.
+    /// Running means of squared residuals and of products of neighbouring ones, in units of the noise; windows that were counted.
     residual: [T; 2],
     last_residual: [Option<T>; N],
     judged: T,
@@ -153,17 +153,13 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     pub fn equation(&self) -> &Equation<T, N, P, E> {
         &self.equation
     }
-    /// What was known of them beforehand.
+    /// Their priors.
     pub fn priors(&self) -> &[Prior<T>; P] {
         &self.priors
     }
-    /// What is known of them now.
+    /// Their estimates.
     pub fn estimates(&self) -> &[Estimate<T>; P] {
         &self.estimates
-    }
-    /// Their values.
-    pub fn values(&self) -> [T; P] {
-        self.estimates.map(|e| e.value)
     }
 
     /// How much larger the standard deviations are than the noise that was declared would make them: by residuals that are
@@ -234,7 +230,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
             Err(heed) => heed,
         };
         if fault == SampleStatus::Refused(Fault::Frozen) {
-            // What was read since it froze is not to be trusted either.
+            // Samples since it froze are discarded too.
             self.windows.open().clear();
             if let Work::Wait(_) = self.work {
                 self.work = Work::Idle;
@@ -309,7 +305,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     /// Whether nothing that is filtered has become NaN or infinite.
     fn finite(&self) -> bool {
         let (motion, measured) = (&self.motion, &self.measured);
-        // A sum is not finite where one of its terms is not, and is taken faster than a look at each.
+        // A sum is not finite where one of its terms is not, and is faster than a check of each.
         let mut sum = measured.moment_on_arm + measured.force_on_arm[0] + measured.force_on_arm[1];
         for j in 0..N {
             sum += motion.q[j] + motion.qd[j] + motion.qdd[j] + measured.torque[j] + self.usual[j];
@@ -398,7 +394,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
                 || rest[j].squared() <= gate * (size.squared() + doubt(j))
         };
         if !(0..N).all(within) {
-            // What is refused has no say in what is usual: else a fault that lasts would open the gate for itself.
+            // Refused samples do not change the usual size: else a lasting fault would open the gate.
             return SampleStatus::Refused(Fault::Unexpected);
         }
         for j in 0..N {

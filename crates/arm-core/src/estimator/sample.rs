@@ -22,7 +22,7 @@ pub struct Sample<T, const N: usize> {
 pub enum SampleStatus {
     /// It counts.
     Taken,
-    /// No joint moves: it says nothing.
+    /// No joint moves: it holds no information.
     Resting,
     /// The filters have not yet settled after a start or a gap.
     Settling,

@@ -7,13 +7,13 @@ pub(super) enum Work {
     Idle,
     /// To wait for so many periods.
     Wait(u32),
-    /// To forget, and to begin with a row: 0 brings back what was known of one unknown, others are those of the joints.
+    /// To forget, and to begin with a row: 0 is a prior row of one unknown, others are those of the joints.
     Row(usize),
     /// To end with that row.
     Rest(usize),
     /// To prepare what the bounds change.
     Copy,
-    /// To solve, and to look for the unknown that lies farthest outside its bounds.
+    /// To solve, and to find the unknown that lies farthest outside its bounds.
     Solve,
     /// To fix an unknown to its upper or lower bound.
     Fix {
@@ -24,7 +24,7 @@ pub(super) enum Work {
     },
     /// To publish the values, and to count what they leave of the window.
     Publish,
-    /// To say how certain as many unknowns are as there are joints, from this one on.
+    /// To compute the standard deviations of as many unknowns as there are joints, from this one on.
     Deviations(usize),
 }
 

@@ -39,7 +39,7 @@ pub struct Settings<T, const N: usize> {
     /// Farthest that the torque which carries the arm may be from that of the arm that was expected, by joint \[N m\]. It
     /// bounds what any error of a sensor can do.
     pub envelope: [T; N],
-    /// Time in which what was learned fades, counted while the arm moves \[s\]; infinite to forget nothing.
+    /// Time constant of forgetting, counted while the arm moves \[s\]; infinite for none.
     pub forgetting: T,
 }
 
@@ -127,7 +127,7 @@ pub(super) struct Tuning<T, const N: usize> {
     pub quarantine: u32,
     /// Multiplications that a period may spend on the last window.
     pub budget: usize,
-    /// Factor of the weight of what was learned, for each window; one to forget nothing.
+    /// Factor on the weight of former windows, for each window; one for no forgetting.
     pub fade: T,
     /// Share of its weight with which one prior row comes back for each window.
     pub refresh: T,
@@ -139,7 +139,7 @@ const POSITIVE: [f64; 2] = [SMALLEST, f64::INFINITY];
 const LONGEST_GAP: f64 = 0.02;
 /// Time after which restarted filters have settled, in periods of their cutoff.
 const SETTLING: f64 = 1.5;
-/// Rows in a period of the low-pass' cutoff. What it lets through changes so slowly that more would say the same again.
+/// Rows in a period of the low-pass' cutoff. Its output changes so slowly that more rows would add nothing.
 const ROWS_PER_PERIOD: f64 = 20.0;
 /// Largest change in a period that can be distinguished from an infinite one.
 const LARGEST: f64 = f32::MAX as f64;
@@ -264,7 +264,7 @@ fn in_range<T: Real>(
 }
 
 impl<T: Real, const N: usize> Tuning<T, N> {
-    /// Whether the arm can have these values. What is NaN is judged elsewhere.
+    /// Whether the arm can have these values. NaN is checked elsewhere.
     pub(super) fn plausible(&self, sample: &Sample<T, N>) -> bool {
         let within = |angles: &Joints<T, N>| {
             let mut pairs = angles.iter().zip(&self.range);

@@ -91,7 +91,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
     }
 
-    /// Forgets; the row that brings back what was known of the next unknown.
+    /// Forgets; returns the prior row of the next unknown.
     fn forget(&mut self) -> Option<Row<T, P>> {
         if self.tuning.fade >= T::ONE {
             return None;
@@ -189,7 +189,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
 
     /// How certain some unknowns are, from one on, and by what; their rows of the root of the next covariance.
     fn judge(&mut self, first: usize) {
-        // Where fewer are left, some before are judged again.
+        // Where fewer are left, some before are computed again.
         let first = first.min(P.saturating_sub(N));
         let places = self.bounded.u.get_mut(first..);
         let Some(rows) = places.and_then(|rows| rows.first_chunk_mut::<N>()) else {

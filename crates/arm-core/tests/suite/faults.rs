@@ -1,4 +1,4 @@
-//! Faults put into the sensors of an estimator with its settings as they come: what it says, and how wrong the torque gets.
+//! Faults put into the sensors of an estimator with its default settings: its reports, and the error of the torque.
 //!
 //! `cargo test -p arm-core --test suite faults -- --nocapture` prints the table of docs/firmware.md.
 

@@ -108,30 +108,6 @@ fn a_device_resists_as_the_laws_say() {
     }
 }
 
-#[test]
-fn an_arm_with_other_values_moves_as_they_say() {
-    let (equation, mut random) = (equation(), Random(22));
-    let values = truth(&equation).map(|v| v * 1.1 + 0.001);
-    let (chain, effects) = equation.with_values(&values);
-    let again = Equation::<f64, 3, 18, 10>::new(chain, effects).expect("an arm");
-    for (a, b) in truth(&again).iter().zip(&values).take(again.used()) {
-        assert!((a - b).abs() < 1e-12, "{a} {b}");
-    }
-    for _ in 0..50 {
-        let motion: Motion<f64, 3> = random.motion();
-        let rest = equation.carrying(&motion, &memory()).torque(&values);
-        let weight = gravity(&chain, &Pose::new(&motion.q));
-        let still = Motion {
-            joint_force: motion.joint_force,
-            ..motion
-        };
-        let expected = weight + resisting_torque(&effects, &still, &memory());
-        // The exponentials of the end stops reach 1e9.
-        let off = (rest - expected).norm() / expected.norm().max(1.0);
-        assert!(off < 1e-12, "{off}");
-    }
-}
-
 /// A rich movement in joint angles, and its torques.
 fn sample(equation: &Equation<f64, 3, 18, 10>, t: f64) -> Sample<f64, 3> {
     let wave = |j: usize| {

@@ -21,6 +21,11 @@ fn random_profiles(shape: Shape, seed: u64) -> impl Iterator<Item = (Profile<f64
     })
 }
 
+/// Speed at half time.
+fn peak_speed(p: &Profile<f64>) -> f64 {
+    p.at(0.5 * p.duration()).velocity
+}
+
 #[test]
 fn starts_and_ends_exactly() {
     for shape in SHAPES {
@@ -57,7 +62,7 @@ fn keeps_its_limits_and_reaches_one_of_them() {
             assert!(speed <= limits.speed * (1.0 + ROUNDING));
             assert!(acceleration <= limits.acceleration * (1.0 + ROUNDING));
             assert!(acceleration > 0.99 * limits.acceleration);
-            assert!((p.peak_speed().abs() - speed) < 1e-2 * speed);
+            assert!((peak_speed(&p).abs() - speed) < 1e-2 * speed);
             if 2.0 * p.ramp() < p.duration() * (1.0 - ROUNDING) {
                 cruising += 1;
                 assert!(speed > limits.speed * (1.0 - ROUNDING));
@@ -75,7 +80,7 @@ fn is_symmetric_in_time() {
             for i in 1..50 {
                 let t = p.duration() * f64::from(i) / 50.0;
                 let (a, b) = (p.at(t), p.at(p.duration() - t));
-                let scale = p.distance().abs() + p.peak_speed().abs();
+                let scale = p.distance().abs() + peak_speed(&p).abs();
                 assert!((a.position + b.position - p.distance()).abs() < ROUNDING * scale);
                 assert!((a.velocity - b.velocity).abs() < 10.0 * ROUNDING * scale);
             }
@@ -129,7 +134,7 @@ fn arithmetic_in_the_head() {
     };
     // 0.5 s and 0.25 rad in each ramp, 1.5 s of cruise.
     let p = Profile::new(Shape::Trapezoid, 2.0, limits).expect("valid");
-    assert_eq!((p.duration(), p.ramp(), p.peak_speed()), (2.5, 0.5, 1.0));
+    assert_eq!((p.duration(), p.ramp(), peak_speed(&p)), (2.5, 0.5, 1.0));
     assert_eq!(
         p.at(0.25),
         Sample {
@@ -156,14 +161,14 @@ fn arithmetic_in_the_head() {
     );
     // Triangular: 0.125 rad up to √(0.125·2) = 0.5 rad/s in 0.25 s.
     let p = Profile::new(Shape::Trapezoid, 0.125, limits).expect("valid");
-    assert_eq!((p.duration(), p.ramp(), p.peak_speed()), (0.5, 0.25, 0.5));
+    assert_eq!((p.duration(), p.ramp(), peak_speed(&p)), (0.5, 0.25, 0.5));
     // The smooth ramp lasts 1.5 times as long: 0.75 s.
     let p = Profile::new(Shape::Smooth, 2.0, limits).expect("valid");
     assert_eq!((p.duration(), p.ramp()), (2.75, 0.75));
     assert_eq!(p.at(0.375).acceleration, 2.0);
     // The movement of the benchmark: half a run of 10 s with ramps of 1 s.
     let p = Profile::timed(Shape::Trapezoid, 9.0, 10.0, 1.0).expect("valid");
-    assert_eq!((p.peak_speed(), p.at(5.0).position), (1.0, 4.5));
+    assert_eq!((peak_speed(&p), p.at(5.0).position), (1.0, 4.5));
 }
 
 #[test]

@@ -95,7 +95,7 @@ fn encode(byte: u8) -> String {
     }
 }
 
-/// Asks for an instance of FMI 3.0.
+/// Requests an instance of FMI 3.0.
 pub unsafe fn three(token: *const c_char, path: *const c_char, event_mode: u8) -> Handle {
     let environment = 42 as *mut c_void;
     unsafe {

@@ -1,4 +1,4 @@
-//! A question that a session can answer: a kind of the catalogue at a place in a shape, and what is free in it.
+//! A candidate of the search: a kind of the catalogue at a place in a shape, and its free parameters.
 
 use arm_core::effect::{Effect, Kind, Nature, Part, Place};
 
@@ -11,7 +11,7 @@ use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
-/// What one effect must earn beyond its freedom, in units of twice the log-likelihood: about one false name in a thousand
+/// Gain needed by one effect beyond its degrees of freedom, in units of twice the log-likelihood: about one false name in a thousand
 /// sessions for a hundred candidates, at 4.4 standard deviations for one parameter.
 pub const THRESHOLD: f64 = 12.0;
 /// One question: a kind at a place in a shape, with what is free in it.
@@ -27,18 +27,18 @@ pub struct Candidate {
     pub rest: Option<usize>,
     /// Shapes that are refined once it is named: their positions and limits.
     pub refined: Vec<(usize, (f64, f64))>,
-    /// How many shapes were tried of this question.
+    /// Number of shapes that were tried.
     pub tried: usize,
     /// Change of the free parameters with which responses are taken.
     pub step: f64,
-    /// What it must earn to be named where scores scatter as the noise tells, in units of twice the log-likelihood; zero
+    /// Gain needed to be named, in units of twice the log-likelihood, where scores scatter as the noise model predicts; zero
     /// before a scan has set it.
     pub price: f64,
-    /// How much more its score scatters between repeats than the noise tells.
+    /// Scatter of its score between repeats, relative to that of the noise model.
     pub spread: f64,
-    /// What it gained when it was last judged beside the others that are named, in units of cost; infinite before.
+    /// Its gain in the last comparison with the other named effects, in units of cost; infinite before.
     pub gained: f64,
-    /// What is known of its numbers before the data: the sizes that an arm of this weight may have.
+    /// Priors of its parameters: the sizes that are usual for an arm of this weight.
     pub expected: Vec<Free>,
 }
 
@@ -72,7 +72,7 @@ impl Candidate {
         is_plainer(&self.refined, effect)
     }
 
-    /// Whether nothing of what it asks for is in an effect.
+    /// Whether all its free parameters are zero in an effect.
     pub fn is_nothing(&self, effect: &Effect<f64>) -> bool {
         self.free.iter().all(|&p| effect.parameters[p] == 0.0)
     }
@@ -90,7 +90,7 @@ impl Candidate {
                 == (effect.kind.family(), effect.index, effect.kind.crosses())
     }
 
-    /// Whether it asks the same, in whatever shape.
+    /// Whether it is the same candidate, in any shape.
     pub fn is_same_question(&self, other: &Self) -> bool {
         self.is_same_effect(&other.effect) && self.question == other.question
     }
@@ -144,9 +144,9 @@ impl Candidate {
         (0..self.width()).map(one).collect()
     }
 
-    /// The question that an effect was asked by, with its shape: its free parameters are set to zero.
+    /// The candidate of an effect, with its shape: its free parameters are set to zero.
     ///
-    /// `None` where no question of the kind has these parameters free, or these movements do not excite it.
+    /// `None` where no candidate of the kind has these parameters free, or these movements do not excite it.
     ///
     pub fn again<const N: usize>(
         prepared: &PreparedSession<N>,
@@ -262,7 +262,7 @@ impl Candidate {
 
 #[cfg(test)]
 impl Candidate {
-    /// A question about the first parameter of an effect, as a scan has not judged it yet.
+    /// A candidate for the first parameter of an effect, before a scan.
     pub(crate) fn about(effect: Effect<f64>) -> Self {
         Self {
             effect,
@@ -287,8 +287,8 @@ pub fn price(width: usize, tried: usize, rows: usize) -> f64 {
     THRESHOLD + width as f64 * libm::log(rows as f64) + 2.0 * libm::log(tried as f64)
 }
 
-/// What is known of the numbers of an effect beforehand: of the first one in a joint by the weight that the joint bears, and of shapes
-/// what the kind says.
+/// Priors of the parameters of an effect: of the first one in a joint from the weight that the joint bears, and of shapes
+/// from the kind.
 pub(super) fn expected<const N: usize>(
     session: &Session<N>,
     effect: &Effect<f64>,

@@ -1,4 +1,4 @@
-//! All questions that a session can answer: each kind of the catalogue at each of its places, in each of its shapes.
+//! All candidates of a session: each kind of the catalogue at each of its places, in each of its shapes.
 
 use std::sync::OnceLock;
 
@@ -18,18 +18,18 @@ use crate::sensitivity::rows::{Columns, Rows};
 
 /// All candidates of a session with their responses; those that the movements do not excite are left out.
 pub struct Library {
-    /// The questions.
+    /// The candidates.
     pub candidates: Vec<Candidate>,
     /// Responses to the columns of each.
     pub responses: Vec<Vec<Response>>,
-    /// The same, made white once they are asked.
+    /// The same, whitened at the first use.
     pub(crate) columns: OnceLock<Columns>,
 }
 
 impl Library {
-    /// Asks the whole catalogue, linearised at an anchor.
+    /// The candidates of the whole catalogue, linearised at an anchor.
     ///
-    /// * `periodic` - frequency \[Hz\] and phase \[rad\] of what swings in phase in all trials, where there is something
+    /// * `periodic` - frequency \[Hz\] and phase \[rad\] of an oscillation with one phase in all trials, if there is one
     ///
     /// # Errors
     /// As [`PreparedSession::responses`].
@@ -41,7 +41,7 @@ impl Library {
         Self::of(prepared, point, |_, _| true, periodic.as_slice())
     }
 
-    /// Asks what may act in one joint alone.
+    /// The candidates in one joint.
     ///
     /// # Errors
     /// As [`PreparedSession::responses`].
@@ -54,7 +54,7 @@ impl Library {
         Self::of(prepared, point, here, &[])
     }
 
-    /// Asks what swings alone, in waves of the given frequencies \[Hz\] and phases \[rad\].
+    /// The oscillating candidates, in waves of the given frequencies \[Hz\] and phases \[rad\].
     ///
     /// # Errors
     /// As [`PreparedSession::responses`].
@@ -84,7 +84,7 @@ impl Library {
                     let mut plain = Effect::new(kind, index);
                     hypothesis.share_rest(&mut plain);
                     let mut own = ask(prepared.session, &motions, plain, part, waves);
-                    // Without repeats nothing tells a shape from what a model gets wrong otherwise: it stays as it was asked.
+                    // Without repeats a shape cannot be distinguished from other errors of the model: it stays at its initial value.
                     if !prepared.repeated && !kind.prior().nature.swings() {
                         own.iter_mut().for_each(|c| c.keep_shapes(part.1));
                     }
@@ -100,7 +100,7 @@ impl Library {
         for candidate in candidates {
             let own: Vec<_> = all.by_ref().take(candidate.width()).collect();
             let own: Vec<Response> = match own.into_iter().collect() {
-                // What cannot be changed a little there cannot be asked there.
+                // A candidate without a small change at this point is left out.
                 Err(GapError::Simulation { .. }) => continue,
                 other => other?,
             };
@@ -117,7 +117,7 @@ impl Library {
         })
     }
 
-    /// The responses in the rows of the anchor, made white once for all that is asked there.
+    /// The responses in the rows of the anchor, whitened once for all uses there.
     pub(crate) fn columns<const N: usize>(
         &self,
         prepared: &PreparedSession<N>,
@@ -183,10 +183,10 @@ pub struct Twin {
 /// Where a kind may act in a session.
 fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<usize> {
     let led = session.comparison == ComparisonMode::Led;
-    // Where no torque acts, all masses are known up to one common factor: nothing can be said of one of them, nor of what a
-    // weight or an inertia could as well be.
+    // Where no torque acts, all masses are known up to one common factor: neither a single mass nor an effect that is equivalent
+    // to a weight or an inertia can be determined.
     let swings_freely = session.swings_freely();
-    // Torques of a contact are told with the lengths: where no path of a robot tells these, a wrong one looks like a wrong weight.
+    // Torques of a contact depend on the lengths: without the path of a robot, a wrong length is equivalent to a wrong weight.
     let lengths_tell = !session.compares_contact_torques();
     match kind.info().place {
         Place::Segment if !lengths_tell && lengthens(kind) => 0..0,

@@ -1,4 +1,4 @@
-//! The catalogue of effects as questions that a session can answer.
+//! The catalogue of effects as candidates of a session.
 
 pub mod candidate;
 pub mod library;

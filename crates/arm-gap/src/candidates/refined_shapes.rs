@@ -189,7 +189,7 @@ mod tests {
         assert!(is_plainer(&limits, &relaxation));
         assert!(is_plainer(&limits, &relaxation.with(&[1.0, SHORTEST])));
         assert!(!is_plainer(&limits, &relaxation.with(&[1.0, 11.9])));
-        // Its own limits say nothing of the session.
+        // The limits of the kind do not depend on the session.
         let info = &Kind::Relaxation.info().parameters[1];
         let own = [(1, (info.min, info.max))];
         assert!(!is_plainer(&own, &relaxation.with(&[1.0, info.max])));

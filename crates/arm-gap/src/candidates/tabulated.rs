@@ -1,11 +1,11 @@
-//! Laws of one's own that are costly to ask: tabulated over angle and speed, once for each shape.
+//! User-defined laws that are costly to evaluate: tabulated over angle and speed, once for each shape.
 
 use std::cell::RefCell;
 use std::sync::{Arc, PoisonError, RwLock};
 
 use arm_core::effect::{Info, Local, MAX_PARAMETERS, OwnLaw, Parameters, Prior};
 
-/// Tables that are kept: a fit comes back to the shapes it has tried.
+/// Number of tables that are kept: a fit returns to shapes it has tried.
 const MOST_TABLES: usize = 24;
 
 /// Where a law is tabulated.
@@ -175,7 +175,7 @@ impl OwnLaw for Tabulated {
             _ => None,
         });
         known.unwrap_or_else(|| {
-            // Nothing is borrowed meanwhile: the law may simulate, and then asks for tables itself.
+            // Nothing is borrowed meanwhile: the law may simulate, and then needs tables itself.
             let tables = self.tables(key, p);
             if tables.is_empty() {
                 return f64::NAN;

@@ -83,7 +83,7 @@ pub(super) fn torque_step<const N: usize>(
         let size = libm::sqrt(square / movement.motion.len().max(1) as f64);
         largest = f64::max(largest, size / movement.torque[unit.index]);
     }
-    // A slow movement hardly feels what grows with speed: no step beyond what the parameter may be.
+    // In a slow movement an effect that grows with speed is small: the step is limited by the range of the parameter.
     let info = &unit.kind.info().parameters[amplitude];
     (largest > LEAST).then(|| f64::min(SHARE / largest, 0.5 * info.max))
 }

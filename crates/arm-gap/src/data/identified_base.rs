@@ -21,8 +21,8 @@ use crate::data::passive_law::{Free, LIKELY, Passive};
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::measurement_model::prediction::Course;
 
-/// Noise of a joint's speed, as a share of the speed, above which the motion is simulated: what measured motion tells of that joint is
-/// noise. Below it is nearer than a simulation that lacks what is to be found.
+/// Noise of a joint's speed, as a share of the speed, above which the motion is simulated, as the measured motion of that joint is
+/// mostly noise. Below, measured motion is closer than a simulation without the missing effects.
 const NOISY: f64 = 0.3;
 /// Standard deviation of a rest angle about the middle of the angles that were reached \[rad\].
 const REST_SD: f64 = 1.0;
@@ -91,7 +91,7 @@ impl<const N: usize> Session<N> {
             if let Some(smoothing) = law.kind.smoothed_by()
                 && self.comparison == ComparisonMode::Led
             {
-                // A joint that rests sticks, until the data say otherwise.
+                // A resting joint sticks, unless the data contradict.
                 passive.effect.parameters[smoothing] = 0.0;
             }
             let size = law.parameters[0];
@@ -124,8 +124,8 @@ impl<const N: usize> Session<N> {
         self
     }
 
-    /// The first fit trials of each movement. The search starts from what these tell and refits it with all; two tell what repeats differ
-    /// by, and to simulate all of them again and again would take longer than the search.
+    /// The first fit trials of each movement. The search starts from their fit and refits it with all; two give the scatter of
+    /// repeats, and repeated simulation of all of them would take longer than the search.
     fn first_repeats(&self) -> Vec<Trial<N>> {
         /// Of each movement.
         const REPEATS: usize = 2;
@@ -148,7 +148,7 @@ impl<const N: usize> Session<N> {
         (found, model): (&Identified<N>, &Model<N>),
     ) -> Vec<WithStd> {
         let shows = |(law, std): &WithStd| law.parameters[0] > LIKELY * std;
-        // Differentiated once, and only where a joint asks for it.
+        // Differentiated once, and only where a joint needs it.
         let moving = LazyCell::new(|| in_motion(&self.trials, found.cutoff).unwrap_or_default());
         for own in laws.chunk_by_mut(|(a, _), (b, _)| a.index == b.index) {
             let mut dry = own.iter().filter(|(l, _)| l.kind.smoothed_by().is_some());
@@ -217,8 +217,8 @@ impl<const N: usize> Session<N> {
         })
     }
 
-    /// Which joints stay where they are but for noise, or turn little with what looks like a viscosity far above any other: that is friction
-    /// that holds the joint nearly all the time. In a joint that turns as far as others it is dry friction at one speed.
+    /// Which joints are at rest except for noise, or turn little with a viscosity far above the usual ones: that is friction which holds
+    /// the joint nearly all the time. In a joint that turns as far as others it is dry friction at one speed.
     fn hardly_moving(&self, laws: &[WithStd]) -> [bool; N] {
         let reach = self.reach();
         let furthest = reach.into_iter().fold(0.0, f64::max);
@@ -232,8 +232,8 @@ impl<const N: usize> Session<N> {
         still
     }
 
-    /// Makes of a law of a joint that hardly moves what holds it: friction that sticks, larger than any torque that it must hold. How
-    /// large it is cannot be told, nor anything else of the joint.
+    /// Replaces the law of a joint that hardly moves by sticking friction, larger than any torque that it must hold. Its size cannot
+    /// be determined, nor any other law of the joint.
     fn hold(&self, passive: &mut Passive) {
         passive.likely = passive.effect.is_dry();
         let holding = self.weight_moment(0);
@@ -241,7 +241,7 @@ impl<const N: usize> Session<N> {
         passive.free.clear();
     }
 
-    /// Laws of joints that are held, which no data can tell.
+    /// Laws of joints that are held, which the data cannot determine.
     pub fn hidden_laws(&self) -> Vec<Effect<f64>> {
         let hidden = self.base.iter().filter(|law| law.free.is_empty());
         hidden.map(|law| law.effect).collect()
@@ -259,7 +259,7 @@ impl<const N: usize> Session<N> {
         held
     }
 
-    /// A law with what is known of its numbers beforehand.
+    /// A law with priors of its parameters.
     fn passive(&self, effect: Effect<f64>) -> Passive {
         /// Change of a law's size that a response is taken with, as a share of its typical size.
         const STEP: f64 = 0.01;

@@ -26,7 +26,7 @@ struct Moving {
     q: Vec<f64>,
     qd: Vec<f64>,
     torque: Vec<f64>,
-    /// Samples that say the same as one, because filters have passed over them.
+    /// Samples per independent sample, as filters correlate them.
     alike: f64,
 }
 
@@ -34,8 +34,8 @@ struct Moving {
 ///
 /// * `chain` - the arm as it was identified
 /// * `laws` - what the joint may have, springs at rest in the middle of the measured angles
-/// * `friction` - what resting samples say of its dry friction, with its standard deviation: it stands where the joint moves one way alone,
-///   since nothing tells it from a rest angle then
+/// * `friction` - its dry friction from resting samples, with its standard deviation: it is kept where the joint moves one way only,
+///   since it cannot be distinguished from a rest angle then
 pub(super) fn laws_in_motion<const N: usize>(
     chain: &Chain<f64, N>,
     trials: &[InMotion<'_, N>],
@@ -62,7 +62,7 @@ pub(super) fn laws_in_motion<const N: usize>(
 pub(super) struct InMotion<'a, const N: usize> {
     trial: &'a Trial<N>,
     motion: Kinematics<N>,
-    /// Samples that say the same as one, because filters have passed over them.
+    /// Samples per independent sample, as filters correlate them.
     alike: f64,
 }
 

@@ -96,7 +96,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         (0..self.session.channels()).map(range).collect()
     }
 
-    /// The share of the samples of each channel that tell anything.
+    /// The share of the samples of each channel that are observable.
     fn observed_share(&self) -> Vec<f64> {
         let channels = self.session.channels();
         let all: usize = self
@@ -126,7 +126,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         shifts: &[Arc<Vec<Thinned>>],
         (range, told): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
-        /// Turns: noise says how far trials are shifted, and what is left without the shifts says what noise is.
+        /// Alternations: the noise weights the fit of the shifts of trials, and residuals without the shifts give the noise.
         const ITERATIONS: usize = 3;
         let known: Vec<f64> = self
             .session

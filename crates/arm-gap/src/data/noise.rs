@@ -17,8 +17,8 @@ use crate::measurement_model::prediction::{Channels, Course};
 
 /// Highest order of the autoregressions: every segment has as many samples.
 const ORDER: usize = SHORTEST;
-/// White noise of this share of a channel's range is always believed in: the path between samples, quantisation and the
-/// model's own simplifications are no better, however smooth the noise of the sensors is.
+/// Floor of white noise as a share of a channel's range: the path between samples, quantisation and the model's own
+/// simplifications are no better, however small the noise of the sensors is.
 const LEAST: f64 = 5e-4;
 
 /// Channels at the samples of a trial that are compared.
@@ -28,7 +28,7 @@ pub struct Thinned {
     pub channels: Channels,
     /// How far each sample is from the one before it; see [`ValidSegments::spacing`].
     pub spacing: Vec<usize>,
-    /// What the force tells at each; see [`ValidSegments::force`].
+    /// Observable force at each; see [`ValidSegments::force`].
     pub force: Vec<ObservableForce>,
 }
 
@@ -84,7 +84,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// White noise of unit size, until the data have told more.
+    /// White noise of unit size, before it is estimated.
     ///
     /// # Errors
     /// None in practice: the model is valid.
@@ -107,8 +107,8 @@ impl Noise {
     ///
     /// * `deviations` - of each trial, already scaled for the freedom that their mean took
     /// * `taken` - the like, whose products add up to the covariance of what was taken out of them and may have been noise
-    /// * `range` - size of each channel, below a share of which no noise is believed
-    /// * `told` - share of the samples of each channel that tell anything; the others are zero
+    /// * `range` - size of each channel, a share of which is the floor of the noise
+    /// * `told` - share of the samples of each channel that are observable; the others are zero
     ///
     /// # Errors
     /// [`GapError::Numerics`] for series too short.
@@ -158,7 +158,7 @@ impl Noise {
                 let both = count as f64 * f64::min(told[a], told[b]);
                 correlation[a * channels + b] /= f64::max(both, 1.0);
             }
-            // The white noise that is believed in belongs to each channel alone.
+            // The floor of white noise is independent between channels.
             correlation[a * (channels + 1)] = correlation[a * (channels + 1)].max(1.0);
         }
         Ok(Self {
@@ -257,11 +257,6 @@ impl Noise {
         move |channels| self.rows(valid_segments.pick(channels), &whitening)
     }
 
-    /// Whitens a set of channels at the samples of a trial.
-    pub fn whiten(&self, channels: &Channels, valid_segments: &ValidSegments) -> Vec<f64> {
-        self.white_at(valid_segments)(channels)
-    }
-
     /// Whitens a set of channels of one trial, whose samples weigh as they do there.
     ///
     /// * `whitening` - of the samples
@@ -281,12 +276,6 @@ impl Noise {
             }
         }
         row
-    }
-
-    /// Whitens channels that are thinned already.
-    pub fn whiten_thinned(&self, thinned: &Thinned) -> Vec<f64> {
-        let whitening = self.whitening_at(thinned.observed());
-        self.rows(thinned.channels.clone(), &whitening)
     }
 
     /// The rows of channels at the samples of a whitening, made white there: each channel by itself, then free of what it shares with
@@ -409,8 +398,8 @@ mod tests {
         assert!(std::iter::zip(&weighed, &plain).all(|(w, p)| *w == 0.25 * p));
     }
 
-    /// Sums of whitened rows vary as much as the rows say, or less: a floor of white noise that is believed in must not be
-    /// undone where channels are made independent.
+    /// Sums of whitened rows have at most the variance that independent rows would have: the floor of white noise must not be
+    /// removed where channels are made independent.
     #[test]
     fn slow_noise_below_the_floor_is_not_better_known_than_it_is() {
         const CHANNELS: usize = 3;
@@ -441,7 +430,9 @@ mod tests {
         let noise = Noise::of(&series, &[], &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
         for c in 0..CHANNELS {
             let squares = series.iter().map(|s| {
-                let sum: f64 = noise.whiten_thinned(s)[c * N..(c + 1) * N].iter().sum();
+                let whitening = noise.whitening_at(s.observed());
+                let rows = noise.rows(s.channels.clone(), &whitening);
+                let sum: f64 = rows[c * N..(c + 1) * N].iter().sum();
                 sum * sum / N as f64
             });
             let variance = squares.sum::<f64>() / series.len() as f64;

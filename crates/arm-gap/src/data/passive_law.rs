@@ -10,13 +10,13 @@ pub(super) const LIKELY: f64 = 2.0;
 pub struct Passive {
     /// The law as it was identified from measured motion.
     pub effect: Effect<f64>,
-    /// Its numbers that are fitted.
+    /// Its fitted parameters.
     pub free: Vec<Free>,
-    /// Whether measured motion shows it; the others are asked again once something is named.
+    /// Whether measured motion shows it; the others are tested again once an effect is named.
     pub likely: bool,
 }
 
-/// A number of a law, with what is known of it beforehand.
+/// A parameter of a law, with its prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Free {
     /// Its position among the parameters.

@@ -14,7 +14,7 @@ use crate::measurement_model::prediction::{Channels, Course};
 use crate::sensitivity::linearized_run::Linear;
 use crate::sensitivity::response::Response;
 
-/// How long a disturbance is felt before and after, the low-pass and the error of its timing included \[s\].
+/// How long a disturbance acts before and after, the low-pass and the error of its timing included \[s\].
 const AROUND: (f64, f64) = (0.5, 0.5);
 
 /// What rest takes from the comparison of a movement.
@@ -22,7 +22,7 @@ const AROUND: (f64, f64) = (0.5, 0.5);
 pub(crate) struct Rest {
     /// Samples that are left out.
     pub left_out: Vec<bool>,
-    /// What the force tells where it does not tell both components.
+    /// Observable force where it is not both components.
     pub told: Arc<Vec<ObservableForce>>,
 }
 
@@ -61,7 +61,7 @@ pub struct PreparedSession<'a, const N: usize> {
     pub(crate) simulated: Arc<Mutex<Vec<Arc<SimulatedRuns<'a, N>>>>>,
 }
 
-/// A hypothesis that was simulated, and what was told from its runs: a search asks the same again when noise or samples have changed.
+/// A simulated hypothesis, and what was computed from its runs: a search needs the same again when noise or samples have changed.
 pub(crate) struct SimulatedRuns<'a, const N: usize> {
     pub hypothesis: Hypothesis<N>,
     /// On the reference of each group.
@@ -76,7 +76,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Makes a session ready; the noise is read off the repeats of the fit trials against the model as given.
     ///
     /// # Errors
-    /// [`GapError`] for data that cannot be judged, or a model that cannot be simulated.
+    /// [`GapError`] for insufficient data, or a model that cannot be simulated.
     pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
         let noise = Noise::unknown(session.channels())?;
         let mut prepared = Self::with_noise(session, noise, threads)?;
@@ -94,7 +94,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Makes a session ready whose noise is known from another one.
     ///
     /// # Errors
-    /// [`GapError`] for data that cannot be judged.
+    /// [`GapError`] for insufficient data.
     pub fn with_noise(
         session: &'a Session<N>,
         noise: Noise,
@@ -212,7 +212,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// What is refitted with every question; see [`Session::nuisances`]. Dropped laws of the base are not.
+    /// What is refitted with every candidate; see [`Session::nuisances`]. Dropped laws of the base are not.
     pub fn nuisances(&self) -> Vec<Coordinate> {
         let first = self.session.effects.len();
         let mut all = self.session.nuisances();

@@ -6,7 +6,7 @@ use crate::data::valid_segments::ValidSegments;
 use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
-/// Mean square of a deviation, in medians of those of all trials, beyond which a trial tells of something else than noise: a sensor
+/// Mean square of a deviation, in medians of those of all trials, beyond which it is not noise: a sensor
 /// that slipped, a muscle that acted.
 const OUTLIER: f64 = 25.0;
 /// Part of all trials that are left out for that at most.

@@ -68,7 +68,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// What the rest of joints with dry friction takes from the comparison of a movement.
     ///
     /// The contact alone places an arm of one or two joints: what holds a resting joint shows in one component of the force
-    /// and nowhere else. A longer arm gives way to it, and nothing is known then.
+    /// and nowhere else. A longer arm moves under it, and nothing is known then.
     fn rest(&self, point: &LinearizationPoint<N>, group: usize) -> Rest {
         let course = &self.courses[self.references[group]];
         let joints: Vec<Vec<bool>> = (0..N)

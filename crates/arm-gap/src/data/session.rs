@@ -1,4 +1,4 @@
-//! What is challenged and by what: the model as given, the trials, and what the calibration promises.
+//! The input of a search: the model as given, the trials, and the tolerances of the calibration.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place, Promise};
 use arm_core::{Chain, Contact, Setup};
@@ -9,7 +9,7 @@ use crate::GapError;
 use crate::data::passive_law::Passive;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 
-/// A data set as the workflow sees it.
+/// A data set, the input of the workflow.
 #[derive(Clone, Debug)]
 pub struct Session<const N: usize> {
     /// The rigid arm of the model.
@@ -20,16 +20,16 @@ pub struct Session<const N: usize> {
     pub effects: Vec<Effect<f64>>,
     /// Relative standard deviation of masses, centres of mass and inertias; 0 holds them.
     pub segment_uncertainty: f64,
-    /// What the calibration promises.
+    /// Tolerances of the calibration.
     pub tolerance: Tolerance,
     /// The trials.
     pub trials: Vec<Trial<N>>,
     /// What is compared.
     pub comparison: ComparisonMode,
-    /// What the samples of each trial weigh, all where there is no entry: less than one where the robot moves between its own samples in a
-    /// way that these do not tell, by what repeats differ in over that and what the robot's path leaves unknown.
+    /// Weights of the samples of each trial, one where there is no entry: less where the motion of the robot between its samples is
+    /// unknown, by the ratio of the scatter of repeats to that plus the error of the robot's path.
     pub weights: Vec<f64>,
-    /// Kinds of one's own that are asked besides those of the catalogue.
+    /// User-defined kinds that are tested besides those of the catalogue.
     pub own: Vec<Kind>,
     /// Laws of joints that the model leaves without one; see [`crate::data::identified_base`].
     pub base: Vec<Passive>,
@@ -48,9 +48,9 @@ pub enum ComparisonMode {
 
 /// Standard deviations beyond which nothing that is known is refitted: what is further off is a fault, and has a name.
 pub(crate) const FURTHEST: f64 = 4.0;
-/// Relative standard deviation of what the model says of its own effects, and of the compliance of its contact.
+/// Relative standard deviation of the effects in the model, and of the compliance of its contact.
 const KNOWN: f64 = 0.05;
-/// Relative standard deviation of what the model says of the damping of its contact.
+/// Relative standard deviation of the damping of the contact in the model.
 const DAMPED: f64 = 0.3;
 
 impl<const N: usize> Session<N> {
@@ -63,7 +63,7 @@ impl<const N: usize> Session<N> {
         altered(&setup, &hypothesis.effects())
     }
 
-    /// All kinds that are asked.
+    /// All kinds that are tested.
     pub fn kinds(&self) -> impl Iterator<Item = Kind> + '_ {
         KINDS.iter().chain(&self.own).copied()
     }

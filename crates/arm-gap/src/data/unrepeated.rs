@@ -18,11 +18,11 @@ const AROUND: usize = 32;
 impl<const N: usize> PreparedSession<'_, N> {
     /// The noise by what no question could explain of a hypothesis' residuals.
     ///
-    /// A swing that dies out is seen ever more clearly: what encoders and a rigid model get wrong grows with the motion. Every
-    /// sample weighs by what is left around it, with the mean over all as one sample more.
+    /// The errors of encoders and of a rigid model grow with the motion, so residuals of a decaying oscillation fall. Every
+    /// sample is weighted by the residuals around it, with the mean over all as one sample more.
     ///
-    /// * `range` - size of each channel, below a share of which no noise is believed
-    /// * `told` - share of the samples of each channel that tell anything
+    /// * `range` - size of each channel, a share of which is the floor of the noise
+    /// * `told` - share of the samples of each channel that are observable
     pub(crate) fn noise_of_residuals(
         &self,
         point: &LinearizationPoint<N>,
@@ -65,8 +65,8 @@ impl<const N: usize> PreparedSession<'_, N> {
 
     /// What is left of residuals when everything that the catalogue could explain is taken out, to first order.
     ///
-    /// Without repeats this is all that tells of the noise: a residual that still holds what is missing would make the
-    /// missing look like noise.
+    /// Without repeats the noise is estimated from this alone: a residual with the missing effects in it would count
+    /// them as noise.
     fn unexplained(&self, point: &LinearizationPoint<N>) -> Result<Vec<Vec<Vec<f64>>>, GapError> {
         let nuisances = self.responses_to(point, &point.coordinates)?;
         let library = Library::build(self, point, None)?;

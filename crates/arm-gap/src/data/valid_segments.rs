@@ -1,4 +1,4 @@
-//! The samples of a trial that are compared, and what the force tells at each.
+//! The samples of a trial that are compared, and the observable force at each.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ pub(crate) const SHORTEST: usize = 4;
 /// Fewest samples of a trial that is compared.
 const FEWEST: usize = 8;
 
-/// What the force on the arm tells at one sample.
+/// Components of the force on the arm that are compared at one sample.
 ///
 /// Dry friction holds a resting joint with any torque up to its own, and the force of the hand bears it. What is left to
 /// compare is the component that no torque in the resting joint changes.
@@ -36,7 +36,7 @@ pub struct ValidSegments {
     samples: Vec<usize>,
     /// Samples of the trial from one that may be compared to the next.
     step: usize,
-    /// What the force tells at every sample of the trial; both components where nothing is listed.
+    /// Observable force at every sample of the trial; both components where nothing is listed.
     observable: Arc<Vec<ObservableForce>>,
 }
 
@@ -44,7 +44,7 @@ impl ValidSegments {
     /// Of one trial.
     ///
     /// * `left_out` - samples that are not compared
-    /// * `observable` - what the force tells at every sample; nothing listed: both components
+    /// * `observable` - observable force at every sample; nothing listed: both components
     pub fn of<const N: usize>(
         trial: &Trial<N>,
         course: &Course<N>,
@@ -132,7 +132,7 @@ impl ValidSegments {
         self.samples.is_empty()
     }
 
-    /// Number of samples at which each of some channels tells anything.
+    /// Number of samples at which each channel is observable.
     pub fn rows_per_channel(&self, channels: usize) -> Vec<usize> {
         let count = |least: usize| {
             let components = self.samples().map(|i| match self.at(i) {
@@ -160,7 +160,7 @@ impl ValidSegments {
 
     /// The values of channels at the samples: `[channel][sample]`.
     ///
-    /// Where the force tells one component alone, it stands in the place of the first, and zero in that of the second.
+    /// Where one component of the force is observable, it replaces the first, and zero the second.
     pub fn pick(&self, channels: &Channels) -> Channels {
         let one = |channel: &Vec<f64>| self.samples().map(|i| channel[i]).collect();
         let mut picked: Channels = channels.iter().map(one).collect();
@@ -184,7 +184,7 @@ impl ValidSegments {
         self.samples.iter().copied()
     }
 
-    /// What the force tells at the samples; nothing is listed where that is both components at all of them.
+    /// Observable force at the samples; nothing is listed where that is both components at all of them.
     pub fn force(&self) -> Vec<ObservableForce> {
         match self.observable.is_empty() {
             true => Vec::new(),

@@ -1,8 +1,8 @@
-//! Rows that are white: of each sample what those before it do not foretell, in units of the noise.
+//! Whitened rows: the prediction error of each sample from those before it, in units of the noise.
 //!
-//! Where dry friction holds a joint the force tells one component or none. A component that was not told foretells nothing: the next
-//! sample is foretold from those that were told before, at the lags that they have, or a level of slow noise would count as new
-//! with every rest.
+//! Where dry friction holds a joint, one component of the force or none is observable. A component that was not observed predicts
+//! nothing: the next sample is predicted from those observed before, at their lags, or a level of slow noise would count as new
+//! after every rest.
 
 use std::collections::BTreeMap;
 
@@ -12,17 +12,17 @@ use arm_numerics::statistics::autoregressive::{Predictor, Whitener};
 use crate::data::valid_segments::ObservableForce;
 use crate::measurement_model::prediction::Channels;
 
-/// Which samples there are, and what the force tells at each.
+/// Which samples there are, and the observable force at each.
 #[derive(Clone, Copy)]
 pub struct Observed<'a> {
     /// How far each sample is from the one before it, in samples; the first is not read.
     pub spacing: &'a [usize],
-    /// What the force tells, in the last two channels; both components at all samples where nothing is listed.
+    /// Observable force, the last two channels; both components at all samples where nothing is listed.
     pub force: &'a [ObservableForce],
 }
 
 impl Observed<'_> {
-    /// What the force tells at a sample.
+    /// Observable force at a sample.
     pub fn force_at(&self, t: usize) -> ObservableForce {
         *self.force.get(t).unwrap_or(&ObservableForce::Both)
     }
@@ -31,11 +31,11 @@ impl Observed<'_> {
 /// How one sample of a channel is made white.
 #[derive(Clone, Debug)]
 enum Row {
-    /// It is foretold by as many samples right before it in its channel.
+    /// It is predicted from as many samples directly before it in its channel.
     Next(usize),
-    /// It is foretold by factors of samples: channel, sample, factor; with one over the standard deviation of what is left.
+    /// It is predicted from samples: channel, sample, factor; with one over the standard deviation of the error.
     From(Vec<(usize, usize, f64)>, f64),
-    /// It tells nothing.
+    /// It is not observable.
     Untold,
 }
 
@@ -81,7 +81,7 @@ impl Whitening {
         }
     }
 
-    /// Whether a sample of a channel tells anything.
+    /// Whether a sample of a channel is observable.
     pub fn is_told(&self, (channel, sample): (usize, usize)) -> bool {
         !matches!(self.rows[channel][sample], Row::Untold)
     }
@@ -119,7 +119,7 @@ struct Known<'a> {
     /// Where each sample stands, in samples.
     place: &'a [usize],
     observed: Observed<'a>,
-    /// Those that were asked, by channel and lags.
+    /// Those that were computed, by channel and lags.
     predictors: BTreeMap<(usize, Vec<usize>), Predictor>,
 }
 
@@ -228,8 +228,8 @@ mod tests {
         channels.iter().flatten().map(|v| v * v).sum()
     }
 
-    /// A level of slow noise is known no better for being interrupted: without any rest, with a component told throughout, and with
-    /// rests in which nothing is told.
+    /// Interruptions do not make a level of slow noise better known: without any rest, with one component observed throughout, and with
+    /// rests in which nothing is observed.
     #[test]
     fn a_rest_tells_no_more_of_a_level_than_motion() {
         use ObservableForce::{Along, Both, Neither};
@@ -249,7 +249,7 @@ mod tests {
             neither < whole && neither > 0.7 * whole,
             "{neither} {whole}"
         );
-        // Told throughout along the first component: the rest changes little.
+        // Observed throughout along the first component: the rest changes little.
         let along = information(&with(Along([1.0, 0.0])), [1.0, 0.0]);
         assert!((along / whole - 1.0).abs() < 0.25, "{along} {whole}");
         // Along a component that turns within the rest, and the other way round.

@@ -1,7 +1,7 @@
 //! Free swings, fitted by simulation.
 //!
-//! What is named is chosen from the equation of motion at every sample. The size of a loss is better told by how far each
-//! swing goes: short runs are simulated from starts of their own, which are fitted with everything else (multiple shooting),
+//! Effects are selected by the equation of motion at every sample. The size of a loss is better estimated from the amplitudes
+//! of the oscillation: short runs are simulated from starts of their own, which are fitted with everything else (multiple shooting),
 //! and the angles are compared. A law that is not exact near rest then still takes the energy that the arm loses.
 
 use arm_core::Joints;
@@ -26,7 +26,7 @@ const MOST_STEPS: usize = 8;
 const HALVINGS: usize = 4;
 /// A step that lowers the cost by less than this share is the last.
 const LEAST_GAIN: f64 = 1e-3;
-/// Size of the residual that is always believed in \[rad\]: the last digit of an encoder.
+/// Floor of the residual \[rad\]: the last digit of an encoder.
 const LEAST: f64 = 1e-6;
 
 /// One run: its trial, first sample and number of samples.
@@ -219,7 +219,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 let samples = j * count..(j + 1) * count;
                 let own = &swing.residuals[w][samples.clone()];
                 let effective = effective_samples(own).ok()?.max(1.0);
-                // No run is trusted a hundred times as much as the mean of them.
+                // No run has more than a hundred times the weight of their mean.
                 let variance = square(w, j) + 0.01 * mean[j] + LEAST * LEAST;
                 let weight = effective / count as f64 / variance;
                 out[samples].fill(weight);

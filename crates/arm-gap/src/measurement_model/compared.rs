@@ -8,7 +8,7 @@ use crate::measurement_model::prediction::{Channels, Course, in_common_band};
 
 impl<const N: usize> Session<N> {
     /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led, but for forces whose robot is not
-    /// known between its samples; torques in the common band, for what differentiated angles say above it is noise.
+    /// known between its samples; torques in the common band, as differentiated angles are noise above it.
     pub fn measured_in(&self, course: &Course<N>) -> Channels {
         match self.comparison {
             ComparisonMode::Led if course.weight < 1.0 => {

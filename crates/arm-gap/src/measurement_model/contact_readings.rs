@@ -1,7 +1,7 @@
 //! What the sensors of hand and contact read where joint torques are compared, and what a hypothesis makes of it.
 //!
-//! The measured torque of a contact is `J(q)ᵀ F` of what angle and force sensors read. What they misread, and a handle that is not where
-//! the model has it, are part of what is predicted: the torque of the readings less that of what a hypothesis says was there.
+//! The measured torque of a contact is `J(q)ᵀ F` of the readings of angle and force sensors. Errors of the readings, and a displaced
+//! handle, are part of the prediction: the torque of the readings minus that of the angles and forces of a hypothesis.
 
 use arm_core::effect::{Effect, Place};
 use arm_core::{Chain, Joints, Placement, Plane, Pose, Reading, Setup, jacobian, static_torque};
@@ -48,7 +48,7 @@ impl<const N: usize> Session<N> {
 }
 
 impl<const N: usize> ContactReadings<N> {
-    /// What the channels tell at a sample of joint torques that are needed \[N m\]: those of what was read, less what is left of them.
+    /// The predicted channels at a sample for required joint torques \[N m\]: the torques of the readings minus their residual.
     ///
     /// What is left is a force that is missing, which counts as the sensors would read it, and what no force is, which counts as much more
     /// as forces are read larger: a gain or a length with which everything shrinks explains nothing.

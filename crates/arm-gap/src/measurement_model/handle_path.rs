@@ -1,4 +1,4 @@
-//! The path on which the robot leads the handle, as far as its angles tell it.
+//! The path on which the robot leads the handle, from its angles.
 
 use arm_core::Plane;
 use arm_ident::regression::measured_motion::low_pass;
@@ -22,8 +22,8 @@ const NOISE_ALONE: f64 = 2.0;
 
 /// The path of the handle, low-passed without phase.
 ///
-/// A stiff contact turns steps of coarse encoders into forces that nobody measured. Where they count, the path keeps the narrowest band
-/// outside of which there is nothing but noise.
+/// A stiff contact turns steps of coarse encoders into simulated forces that did not act. Where these are large, the path keeps the
+/// narrowest band outside of which there is only noise.
 /// * `noise` - see [`path_noise`]
 /// * `forces` - force on the arm along y and z as measured \[N\], and stiffness of the contact along both \[N/m\]
 /// * `band` - of the comparison \[Hz\]
@@ -86,7 +86,7 @@ fn axes_of(points: &[Plane<f64>]) -> Vec<Vec<f64>> {
 
 /// Power of each channel above a cutoff, for each hertz up to half of the sampling rate.
 ///
-/// * `typical` - what stands for all squares
+/// * `typical` - the typical value of squares
 fn densities(
     channels: &[Vec<f64>],
     cutoff: f64,
@@ -119,7 +119,7 @@ mod tests {
 
     const RATE: f64 = 100.0;
 
-    /// A movement of 0.2 m within 4 s, with a swing of 6 Hz, and numbers that look random added.
+    /// A movement of 0.2 m within 4 s, with an oscillation of 6 Hz and pseudo-random numbers added.
     fn path(swing: f64, noise: f64) -> Vec<Plane<f64>> {
         let mut state = 1_u64;
         let mut random = || {

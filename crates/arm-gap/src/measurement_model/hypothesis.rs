@@ -1,4 +1,4 @@
-//! What is believed of a rig: its segments, its known effects, its calibration, and the effects that were named.
+//! A hypothesis about a rig: its segments, its known effects, its calibration, and the named effects.
 
 use arm_core::effect::Effect;
 use arm_core::{Chain, Contact, Invalid, Segment, Setup};
@@ -170,7 +170,7 @@ impl<const N: usize> Hypothesis<N> {
         }
     }
 
-    /// The segments as believed.
+    /// The segments of the hypothesis.
     pub fn believed(&self, nominal: &[Segment<f64>; N]) -> [Segment<f64>; N] {
         core::array::from_fn(|k| {
             let [mass, com, inertia] = self.segments[k].map(|change| 1.0 + change);
@@ -266,7 +266,7 @@ pub(crate) mod tests {
         };
         let (stiffness, rest) = (number(0, 0.8), number(1, 7.0));
         let product = |h: &Hypothesis<2>| h.known[0].parameters[0] * h.known[0].parameters[1];
-        // The rest angle stands before the stiffness: their order says nothing.
+        // The rest angle precedes the stiffness: their order does not matter.
         let after = before.moved(&[(&rest, -1.7), (&stiffness, 0.2)]);
         let first_order = 0.5 * 0.1 + 0.2 * 0.1 - 0.5 * 1.7;
         assert!((product(&after) - first_order).abs() < 1e-12);

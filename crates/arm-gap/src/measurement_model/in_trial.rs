@@ -1,7 +1,7 @@
 //! A hypothesis as it is in one trial: where the handle is there, in the hand and in the room, and the phase that a rhythm is in.
 //!
-//! Neither is the same from one trial to the next, so that no other trial tells them. They are read off each trial by itself,
-//! whatever its role and whatever hypothesis is shown: two numbers each for the handle, as far as what is declared of it lets them
+//! Neither is the same from one trial to the next, so they are estimated from each trial alone,
+//! whatever its role and hypothesis: two numbers each for the handle, as far as what is declared of it lets them
 //! go, and one for a rhythm.
 
 use std::sync::Arc;
@@ -79,7 +79,7 @@ impl<const N: usize> Session<N> {
         Ok(own)
     }
 
-    /// Rhythms with the phases that runs with them tell: a joint that sticks without a rhythm slips with it, and answers otherwise.
+    /// Rhythms with phases from runs with them: a joint that sticks without a rhythm slips with it, and responds differently.
     fn phased_by_runs(
         &self,
         (own, mut rhythms): (&Hypothesis<N>, Vec<Effect<f64>>),
@@ -105,7 +105,7 @@ impl<const N: usize> Session<N> {
     }
 }
 
-/// Gives rhythms the phases that their sizes at 0 and 90° say; what a trial does not tell stays as it is.
+/// Sets the phases of rhythms from their sizes at 0 and 90°; an unobservable phase stays as it is.
 fn in_phase(rhythms: &mut [Effect<f64>], sizes: &[f64]) {
     for (rhythm, size) in std::iter::zip(rhythms, sizes.chunks_exact(2)) {
         if size != [0.0, 0.0] {
@@ -114,7 +114,7 @@ fn in_phase(rhythms: &mut [Effect<f64>], sizes: &[f64]) {
     }
 }
 
-/// What the sensors would read of one trial under a hypothesis, in the common band, and the run along which small changes of it are told.
+/// What the sensors would read of one trial under a hypothesis, in the common band, and the run along which small changes of it are computed.
 struct ShownTrial<'a, const N: usize> {
     session: &'a Session<N>,
     course: &'a Arc<Course<N>>,
@@ -202,9 +202,9 @@ fn with_phase(rhythm: &Effect<f64>, phase: f64) -> Effect<f64> {
     effect
 }
 
-/// How much of each column is in what is left of a trial; zeros where it does not tell.
+/// Coefficients of the columns in the residual of a trial; zeros where it does not determine them.
 ///
-/// * `sd` - standard deviation of what is known of a column's size, which goes no further than [`FURTHEST`] of them
+/// * `sd` - prior standard deviation of a column's size, which is limited to [`FURTHEST`] of them
 fn sizes<const N: usize>(
     left: &Channels,
     columns: &[Channels],

@@ -43,8 +43,8 @@ pub struct Course<const N: usize> {
     pub rate: f64,
     /// Cutoff of the low-pass \[Hz\].
     pub band: f64,
-    /// Samples over which a gap is measured: those that were measured. Where torques are compared, those [`MARGIN`] away from ends
-    /// and gaps, next to which filters and differences have guessed.
+    /// Samples over which a gap is measured: those that were measured. Where torques are compared, those `MARGIN` away from ends
+    /// and gaps, next to which filters and differences extrapolate.
     pub counted: Vec<bool>,
     /// What its samples weigh. Where that is less than one, forces are compared in the common band only: above it they hang on what the
     /// robot did between its samples.
@@ -378,7 +378,7 @@ pub fn away_from_gaps(valid: &[bool], margin: usize) -> Vec<bool> {
 
 /// Motion of the joints from measured angles, and from measured speeds only where the angles are too noisy for it.
 ///
-/// A controller's speed is the derivative of its angles behind a filter that nobody knows. What it is late by works against viscous
+/// A controller's speed is the derivative of its angles behind an unknown filter. Its delay counteracts viscous
 /// friction: 0.8 ms take all damping away from a pendulum of 0.3 m that rings for a minute.
 fn motion<const N: usize>(trial: &Trial<N>, band: f64) -> Result<Kinematics<N>, GapError> {
     let mut angles = trial.clone();

@@ -1,4 +1,4 @@
-//! Where a led arm starts: at rest, with the dry friction that the measured force tells.
+//! Where a led arm starts: at rest, with the dry friction that follows from the measured force.
 
 use arm_core::effect::{Effect, Kind, Motion, dry_friction, resisting_besides_dry};
 use arm_core::{
@@ -15,7 +15,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::joint_torques::offsets;
 use crate::measurement_model::prediction::Course;
 
-/// Samples at the start whose mean tells where the arm was at rest.
+/// Samples at the start whose mean is the position at rest.
 const START: usize = 5;
 /// Time at the start over which forces are averaged \[s\].
 const START_TIME: f64 = 0.2;
@@ -81,8 +81,8 @@ impl<const N: usize> Session<N> {
     /// The angles near which a run starts \[rad\], see [`Session::near`], and what dry friction resists with there, where the handle places a
     /// joint \[N m\].
     ///
-    /// A joint at rest is held by any torque up to what it resists with in motion, and the force on a resting arm shows which. What the
-    /// handle leaves free stays where it is measured instead: see [`held_at_start`].
+    /// A joint at rest is held by any torque up to its friction in motion, and the force on a resting arm shows which. Joints that the
+    /// handle leaves free stay at their measured angles instead: see `held_at_start`.
     ///
     /// # Errors
     /// [`SimulationError`] for a rig that cannot be.

@@ -12,7 +12,7 @@ pub struct Absorbed {
     pub name: String,
     /// Its value, in `unit`.
     pub value: f64,
-    /// Twice the standard deviation that was known of it beforehand: the tolerance of the data set, or the `segment_uncertainty`.
+    /// Twice its prior standard deviation: the tolerance of the data set, or the `segment_uncertainty`.
     pub promised: f64,
     /// SI unit; `of its value` for what is relative.
     pub unit: String,
@@ -130,7 +130,7 @@ fn worded(kind: Kind, index: usize) -> String {
 mod tests {
     use super::*;
 
-    /// A viscosity of 0.1 that was refitted to 0.11 with a prior of 0.005: a tenth more, where twice a twentieth was promised.
+    /// A viscosity of 0.1 that was refitted to 0.11 with a prior of 0.005: a tenth more, where twice a twentieth is the tolerance.
     #[test]
     fn what_was_refitted_is_told_relative_to_what_was_promised() {
         let model = "[[arm.segment]]\nlength = 0.5\nmass = 2.0\ncom = 0.2\ninertia = 0.02\n[[arm.joint]]\nviscosity = 0.1\n";
@@ -176,11 +176,11 @@ mod tests {
         assert!((told[2].value - 0.1).abs() < 1e-12 && (told[2].promised - 0.1).abs() < 1e-12);
         assert_eq!(told[2].unit, RELATIVE);
 
-        // Nothing is far; then the place of the robot is as far as is allowed, and alone is told.
+        // No value is at its limit; then the place of the robot is, and alone is reported.
         assert_eq!(stopped(&model, &hypothesis, unknowns.iter()), None);
         let mut bounded = unknowns;
         (bounded[0].upper, bounded[1].upper) = (0.02, 0.003);
-        // As far as is allowed, and yet within what was promised.
+        // At its limit, and yet within the tolerance.
         assert_eq!(stopped(&model, &hypothesis, bounded.iter()), None);
         bounded[1].prior = Some((0.0, 0.001));
         let told = stopped(&model, &hypothesis, bounded.iter()).expect("a warning");

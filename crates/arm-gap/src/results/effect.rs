@@ -2,13 +2,13 @@ use arm_core::effect::{Effect as CoreEffect, Kind, Place as ActsOn};
 use arm_model::Effect;
 use serde::Serialize;
 
-use super::{Asked, Named, Value, at_most, placed};
+use super::{Named, SearchInput, Value, at_most, placed};
 use crate::measurement_model::hypothesis::Target;
 use crate::selection::conclusion::Finding;
-use crate::selection::model_selection::{self, Alternative as Fitted, TIE};
+use crate::selection::model_selection::{self, FittedAlternative, TIE};
 use crate::trial_specific::component::TrialSpecific;
 
-/// A movement that would tell two explanations apart.
+/// A movement that would distinguish two explanations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Separation {
     /// Joint angles \[deg\].
@@ -19,14 +19,14 @@ pub struct Separation {
     pub acceleration_rad_s2: f64,
     /// `trapezoid` or `smooth`.
     pub shape: String,
-    /// Standard deviations that the two are apart by the fit trials alone, everything refitted: no more than their misfits say, whatever was
-    /// expected to first order.
+    /// Distance of the two in standard deviations by the fit trials alone, everything refitted: at most the difference of their fits,
+    /// even where more is expected to first order.
     pub now: f64,
     /// The same with one such trial more.
     pub then: f64,
 }
 
-/// Another effect that would explain what a named one does.
+/// Another effect that explains the same as a named one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Alternative {
     /// Its kind.
@@ -39,9 +39,9 @@ pub struct Alternative {
     pub why: String,
     /// How much worse it does, in units of twice the log-likelihood; a few units decide nothing.
     pub worse: f64,
-    /// Squared cosine between what the two would show on these movements: 1 cannot be told apart; not a number where it was not asked.
+    /// Squared cosine between the responses to the two on these movements: 1 cannot be distinguished; NaN where it was not computed.
     pub likeness: f64,
-    /// A movement that would tell the two apart, in words.
+    /// A movement that would distinguish the two, in words.
     pub separating_movement: Option<String>,
     /// The same as numbers.
     pub separation: Option<Separation>,
@@ -71,7 +71,7 @@ fn how_well(worse: f64) -> &'static str {
 }
 
 impl Alternative {
-    fn of(fitted: &Fitted) -> Self {
+    fn of(fitted: &FittedAlternative) -> Self {
         let (worse, likeness) = (fitted.worse, fitted.likeness);
         Self {
             free: fitted.candidate.free.clone(),
@@ -107,7 +107,7 @@ pub struct Missing {
     pub channel: Option<String>,
     /// Its parameters by name, with signs as in the files.
     pub parameters: Named<Value>,
-    /// Probability of such a gain by chance, all questions that were asked counted.
+    /// Probability of such a gain by chance, corrected for the number of candidates.
     pub p_value: f64,
     /// Share of what can be explained that is lost without it.
     pub share: f64,
@@ -142,9 +142,9 @@ fn sign_in_files(kind: Kind, force_on_robot: bool) -> f64 {
 impl Missing {
     /// A named effect of all trials.
     pub(super) fn named<const N: usize>(
-        named: &model_selection::Named,
+        named: &model_selection::NamedEffect,
         finding: &Finding<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Self {
         let effect = &finding.amended.hypothesis.named[named.slot];
         let info = effect.kind.info();
@@ -186,9 +186,9 @@ impl Missing {
     pub(super) fn trial_specific<const N: usize>(
         one: &TrialSpecific,
         finding: &Finding<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Self {
-        /// Parameters that say when and how fast, not how large.
+        /// Parameters of time and speed, not of size.
         const SHAPES: [&str; 4] = ["frequency", "phase", "start", "duration"];
         let effect = &one.effect;
         let info = effect.kind.info();

@@ -8,8 +8,8 @@ use super::absorbed::{absorbed, stopped};
 use super::channel_gap::channel_gaps;
 use super::limit::limits;
 use super::{
-    Absorbed, Asked, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, SearchStep,
-    SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
+    Absorbed, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, SearchInput,
+    SearchStep, SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
 };
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
@@ -46,7 +46,7 @@ pub struct GapResult {
     pub places: Vec<Place>,
     /// The gap of each channel on the test trials.
     pub gap: Named<ChannelGap>,
-    /// What was asked for and not named.
+    /// Candidates that were not named.
     pub would_have_seen: Vec<Limit>,
     /// Share of what the calibrated model left beyond noise that is still there.
     pub unexplained: f64,
@@ -58,7 +58,7 @@ pub struct GapResult {
     pub lack: [Lack; 2],
     /// Rounds of the search.
     pub search_trace: Vec<SearchStep>,
-    /// What a reader should know of the data.
+    /// Remarks on the data.
     pub warnings: Vec<String>,
     /// The model with the named effects, everything refitted.
     pub model: Model,
@@ -84,7 +84,7 @@ impl GapResult {
     pub fn of<const N: usize>(
         prepared: &PreparedSession<'_, N>,
         finding: &Finding<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Result<Self, Refused> {
         let [calibrated, amended] = finding.in_trials.each_ref().map(Vec::as_slice);
         let plays = [
@@ -170,7 +170,7 @@ impl GapResult {
 }
 
 /// Every named effect, that which explains most first.
-fn effects<const N: usize>(finding: &Finding<N>, asked: &Asked<'_>) -> Vec<Missing> {
+fn effects<const N: usize>(finding: &Finding<N>, asked: &SearchInput<'_>) -> Vec<Missing> {
     let together = finding.named.iter();
     let together = together.map(|n| Missing::named(n, finding, asked));
     let apart = finding.trial_specific.iter();
@@ -253,7 +253,7 @@ impl Serialize for GapResult {
     }
 }
 
-/// What a first look shows, in the terms of the files.
+/// Result of the first-order screening, in the terms of the files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Screening {
     /// Segments, contact and known effects refitted.
@@ -269,14 +269,14 @@ pub struct Screening {
 }
 
 impl Screening {
-    /// What a first look found, in the terms of the files.
+    /// Converts the result of the first-order screening to the terms of the files.
     ///
     /// # Errors
     /// [`Refused`] where a refitted value is none that a model may have.
     pub fn of<const N: usize>(
         prepared: &PreparedSession<'_, N>,
         look: &Look<N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
     ) -> Result<Self, Refused> {
         let plays = [(Version::Calibrated, look.in_trials.as_slice())];
         let trials = SimulatedTrial::played(prepared, asked, &plays);

@@ -121,7 +121,7 @@ pub struct Suspect {
 }
 
 impl Suspect {
-    pub(super) fn of(one: &first_order_screening::Suspect) -> Self {
+    pub(super) fn of(one: &first_order_screening::ScreenedCandidate) -> Self {
         let (kind, joint, channel) = placed(one.effect.kind, one.effect.index);
         let known = one.effect.kind.info().parameters;
         let free = &one.candidate.free;
@@ -160,7 +160,7 @@ pub struct SearchStep {
 }
 
 impl SearchStep {
-    pub(super) fn of(step: &search_state::SearchStep) -> Self {
+    pub(super) fn of(step: &search_state::SearchRound) -> Self {
         let place = |c: &Candidate| placed(c.effect.kind, c.effect.index);
         let tried = step.tried.iter().map(|(members, gain)| Tried {
             effects: members.iter().map(place).collect(),

@@ -3,24 +3,24 @@
 
 mod absorbed;
 mod amended;
-mod asked;
 mod channel_gap;
 mod effect;
 mod found;
 mod limit;
 mod root_mean_square;
+mod search_input;
 mod simulated;
 mod value;
 mod verdict;
 
 pub use absorbed::Absorbed;
 pub use amended::Fitted;
-pub use asked::{Asked, TrialFile};
 pub use channel_gap::{ChannelGap, Open, channel_names, confirmed};
 pub use effect::{Alternative, Missing, Place, Separation};
 pub use found::{GapResult, Lack, Screening};
 pub use limit::{Limit, SearchStep, Suspect, Tried};
 pub use root_mean_square::{pairwise_sum, root_mean_square};
+pub use search_input::{SearchInput, TrialFile};
 pub use simulated::{SimulatedTrial, Version, sizes};
 pub use value::Value;
 pub use verdict::{Evidence, MISFIT, NEAR_NOISE, NEGLIGIBLE, Verdict};
@@ -31,7 +31,7 @@ use arm_model::Site;
 /// Values by name, in their order.
 pub type Named<T> = indexmap::IndexMap<String, T>;
 
-/// Name of a kind, joint or segment from 1, and channel, of what the core knows by an index.
+/// Name of a kind, joint or segment from 1, and channel, from the index in the core.
 fn placed(kind: Kind, index: usize) -> (String, Option<usize>, Option<String>) {
     let name = kind.info().kind.to_owned();
     match Site::of(kind, index) {

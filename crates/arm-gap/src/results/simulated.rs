@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use arm_ident::regression::trial::Role;
 
-use super::{Asked, root_mean_square};
+use super::{SearchInput, root_mean_square};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
@@ -45,7 +45,7 @@ pub struct SimulatedTrial {
     pub test: bool,
     /// Sampling rate \[Hz\].
     pub rate: f64,
-    /// Samples over which a gap is measured, and which tell by how much repeats differ: not those that a disturbance has touched.
+    /// Samples over which a gap and the scatter of repeats are measured: not those that a disturbance affects.
     pub counted: Vec<bool>,
     /// Measured channels.
     pub measured: Channels,
@@ -81,7 +81,7 @@ impl SimulatedTrial {
     /// Every trial of a session with what the model as given and other hypotheses, as they are in each trial, show of it.
     pub(super) fn played<const N: usize>(
         prepared: &PreparedSession<'_, N>,
-        asked: &Asked<'_>,
+        asked: &SearchInput<'_>,
         plays: &[(Version, &[Hypothesis<N>])],
     ) -> Vec<Self> {
         let session = prepared.session;

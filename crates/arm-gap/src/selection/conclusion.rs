@@ -8,9 +8,9 @@ use crate::data::prepared_session::PreparedSession;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::selection::model_selection::Named;
+use crate::selection::model_selection::NamedEffect;
 use crate::selection::passive_base::BaseLaw;
-use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep, Settled};
+use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
 use crate::selection::set_apart::SetApart;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
@@ -23,18 +23,18 @@ pub struct Finding<const N: usize> {
     /// The model with the named effects.
     pub amended: Fitted<N>,
     /// The named effects, those that explain most first.
-    pub named: Vec<Named>,
+    pub named: Vec<NamedEffect>,
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
     /// The calibrated and the amended model as they are in each trial; see [`crate::measurement_model::in_trial`].
     pub in_trials: [Vec<Hypothesis<N>>; 2],
     /// Rounds of the search.
-    pub search_trace: Vec<SearchStep>,
+    pub search_trace: Vec<SearchRound>,
     /// How well the amended model is known.
     pub precision: Precision,
     /// Lack of fit of the calibrated and of the amended model.
     pub lack: [LackOfFit; 2],
-    /// What else was asked.
+    /// The other candidates.
     pub ruled: Vec<Ruled>,
     /// Misfit for each degree of freedom.
     pub scale: f64,
@@ -53,10 +53,10 @@ struct Known<const N: usize> {
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// Judges the passive base, and measures what is left.
+    /// Selects the laws of the passive base, and measures what is left.
     pub(crate) fn concluded(
         &mut self,
-        (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
+        (mut state, mut named): (SearchState<'a, N>, Vec<NamedEffect>),
         mut apart: SetApart<N>,
         progress: Progress<'_>,
     ) -> Result<Finding<N>, GapError> {
@@ -112,14 +112,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
-    /// Judges the base, and what is named beside it once more where that changes: a spring over two joints that is named brings back the
-    /// springs of both joints, and what had stood for them is left over.
+    /// Selects the laws of the base, and tests the other named effects again where the base changes: a named spring over two joints brings
+    /// back the springs of both joints, and the effects that had replaced them become redundant.
     fn judged_with_base(
         &mut self,
-        (mut state, mut named): (SearchState<'a, N>, Vec<Named>),
+        (mut state, mut named): (SearchState<'a, N>, Vec<NamedEffect>),
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<(SearchState<'a, N>, Vec<Named>, Vec<BaseLaw<N>>), GapError> {
+    ) -> Result<(SearchState<'a, N>, Vec<NamedEffect>, Vec<BaseLaw<N>>), GapError> {
         progress("judging the passive base", 0.88)?;
         let found = (state.current.asked.clone(), self.dropped.clone());
         let settled = self.afresh((state.current, state.point));
@@ -154,7 +154,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn known(
         &mut self,
         (amended, point): Settled<'a, N>,
-        named: &mut Vec<Named>,
+        named: &mut Vec<NamedEffect>,
         (base, scale): (&[BaseLaw<N>], f64),
     ) -> Result<Known<N>, GapError> {
         let alone = self.precision(&point, &amended, scale)?;
@@ -196,7 +196,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The amended model refitted with the noise of all fitted trials, and how well it is known then.
     ///
-    /// Of slow noise the differences of few repeats hold few independent samples, and what they say of it is what they happen to.
+    /// Of slow noise, the differences of few repeats hold few independent samples, so its estimate from them is uncertain.
     fn weighed_by_what_is_left(
         &mut self,
         (amended, point): (&Fitted<N>, LinearizationPoint<'a, N>),
@@ -243,7 +243,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 }
 
-/// Whether the named effects and the laws of the base that are dropped are those that were judged.
+/// Whether the named effects and the dropped laws of the base are those of the last selection.
 fn is_as_judged(found: &(Vec<Candidate>, Vec<bool>), now: &(Vec<Candidate>, Vec<bool>)) -> bool {
     let same = |(a, b): (&Candidate, &Candidate)| a.is_same_question(b);
     found.1 == now.1 && found.0.len() == now.0.len() && std::iter::zip(&found.0, &now.0).all(same)
@@ -253,7 +253,7 @@ fn is_as_judged(found: &(Vec<Candidate>, Vec<bool>), now: &(Vec<Candidate>, Vec<
 fn widened<const N: usize>(
     alone: &Precision,
     amended: &Fitted<N>,
-    named: &[Named],
+    named: &[NamedEffect],
     (first, base): (usize, &[BaseLaw<N>]),
 ) -> Precision {
     let mut precision = alone.clone();
@@ -292,11 +292,11 @@ fn rhythms_of(trial_specific: &[TrialSpecific]) -> Vec<Effect<f64>> {
     rhythms.map(|a| a.effect).collect()
 }
 
-/// Says what share of all that is explained is lost without each effect, and sorts by it.
+/// Computes the share of all that is explained that is lost without each effect, and sorts by it.
 ///
 /// * `explained` - what all of them explain, in units of twice the log-likelihood; infinite where nothing can be simulated without
 ///   them
-fn share_out(named: &mut [Named], explained: f64) {
+fn share_out(named: &mut [NamedEffect], explained: f64) {
     let all = match explained.is_finite() {
         true => explained,
         false => named.iter().map(|n| n.gain).sum(),

@@ -1,4 +1,4 @@
-//! A first look: what calibration takes away, and what each kind of the catalogue would explain to first order.
+//! Screening before the search: the effect of calibration, and what each kind of the catalogue would explain to first order.
 
 use arm_core::effect::Effect;
 
@@ -14,7 +14,7 @@ use crate::selection::score_test::ScoreTest;
 use crate::selection::search_state::Progress;
 use crate::trial_specific::tremor_detection::Line;
 
-/// What a first look shows; nothing in it was converged by simulation but the calibration.
+/// Result of the screening; only the calibration was converged by simulation.
 #[derive(Clone, Debug)]
 pub struct Look<const N: usize> {
     /// The model after refitting what was never exact.
@@ -24,12 +24,12 @@ pub struct Look<const N: usize> {
     /// Its lack of fit.
     pub lack: LackOfFit,
     /// Every candidate alone, the one that is most worth its price first.
-    pub suspects: Vec<Suspect>,
+    pub suspects: Vec<ScreenedCandidate>,
 }
 
 /// One candidate alone, to first order.
 #[derive(Clone, Debug)]
-pub struct Suspect {
+pub struct ScreenedCandidate {
     /// The question.
     pub candidate: Candidate,
     /// The effect as it would be.
@@ -43,7 +43,7 @@ pub struct Suspect {
 }
 
 impl<const N: usize> PreparedSession<'_, N> {
-    /// Calibrates, and asks every candidate alone to first order.
+    /// Calibrates, and tests every candidate alone to first order.
     ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
@@ -58,11 +58,11 @@ impl<const N: usize> PreparedSession<'_, N> {
         let library = Library::build(self, &point, None)?;
         let score_test = ScoreTest::new(self, &calibrated, &point, &library)?.scaled();
         let lack = lack_of_fit(self, &point, &calibrated);
-        let mut suspects: Vec<Suspect> = (0..score_test.len())
+        let mut suspects: Vec<ScreenedCandidate> = (0..score_test.len())
             .filter_map(|c| {
                 let choice = score_test.evaluate(&[c])?;
                 let candidate = library.candidates[c].clone();
-                Some(Suspect {
+                Some(ScreenedCandidate {
                     effect: candidate.found(&choice.coefficients[0]),
                     gain: choice.gain / score_test.scale,
                     price: score_test.price[c] * score_test.spread[c],
@@ -72,8 +72,8 @@ impl<const N: usize> PreparedSession<'_, N> {
             })
             .collect();
         suspects.sort_by(|a, b| (b.gain - b.price).total_cmp(&(a.gain - a.price)));
-        // Of several shapes and questions of one effect the best stands for it, and shows as much as the clearest.
-        let mut best: Vec<Suspect> = Vec::new();
+        // Of several shapes and candidates of one effect the best represents it, with the smallest visible size.
+        let mut best: Vec<ScreenedCandidate> = Vec::new();
         for suspect in suspects {
             match best
                 .iter_mut()

@@ -110,7 +110,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// The normal equations of all unknowns at a fitted hypothesis: nuisances first, then the named effects' own, then
-    /// whatever else is asked.
+    /// other columns.
     ///
     /// # Errors
     /// As [`PreparedSession::responses_at`].
@@ -249,7 +249,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             }
             let there = match self.linearize(&after.hypothesis) {
                 Ok(there) => there,
-                // What can be followed but not simulated is no answer.
+                // A solution that can be followed but not simulated is refused.
                 Err(_) => break,
             };
             let simulated = self.state(&there, after.hypothesis, after.asked)?;
@@ -399,7 +399,7 @@ impl Precision {
 impl<const N: usize> PreparedSession<'_, N> {
     /// How well the unknowns of a fitted hypothesis are known.
     ///
-    /// The spread between trials counts where it is larger than the noise tells.
+    /// The spread between trials counts where it is larger than the noise model predicts.
     ///
     /// # Errors
     /// [`GapError::Numerics`] as [`PreparedSession::equations`].
@@ -410,7 +410,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         scale: f64,
     ) -> Result<Precision, GapError> {
         match self.equations(point, fitted, &Columns::default()) {
-            // Where a small change of what was found cannot be simulated, nothing can be said of how well it is known.
+            // Where a small change of the solution cannot be simulated, its precision is unknown.
             Err(GapError::Simulation { .. }) => {
                 let mut coordinates = point.coordinates.clone();
                 coordinates.extend(fitted.named());
@@ -451,7 +451,7 @@ fn precision_of<const N: usize>(
     Precision { coordinates, sd }
 }
 
-/// The places of the coordinates that the data and what is known beforehand decide, and the factor of their equations.
+/// The places of the coordinates that data and priors determine, and the factor of their equations.
 pub(crate) fn decided<const N: usize>(
     fitted: &Fitted<N>,
     coordinates: &[Coordinate],

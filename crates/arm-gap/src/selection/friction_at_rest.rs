@@ -1,4 +1,4 @@
-//! What dry friction does at rest: it sticks, or it creeps below some speed. Whole trials tell, rest included.
+//! Dry friction at rest: it sticks, or it creeps below some speed. Whole trials decide, rest included.
 
 use arm_core::effect::Kind;
 
@@ -54,7 +54,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// The dry law of the base alone, where a second one is named in its joint and explains no more than its price beyond what the first
-    /// does with other speeds below which joints creep: a wrong one leaves what looks like a second law. `None` where there is none.
+    /// does with another creep speed: a wrong one leaves a residual like that of a second law. `None` where there is none.
     ///
     /// * `scale` - as in [`SearchState`](crate::selection::search_state::SearchState)
     pub(crate) fn with_one_dry_law(
@@ -142,7 +142,7 @@ fn cheapest<const N: usize>(
     (laws, speeds): (&[Target], &[f64]),
     fitted: impl Fn(Hypothesis<N>) -> Option<Fitted<N>>,
 ) -> Fitted<N> {
-    // What one joint does at rest another moves by: a choice is asked again when another one has changed since.
+    // The mode of one joint at rest changes the motion of others: a choice is tested again when another one has changed since.
     let mut since_change = 0;
     for &law in laws.iter().cycle().take(SWEEPS * laws.len()) {
         if since_change == laws.len() {

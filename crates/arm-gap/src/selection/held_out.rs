@@ -25,12 +25,12 @@ pub struct Gap {
     /// Standard deviation of the difference of both where nothing is missing.
     pub floor_std: Option<f64>,
     /// Where more is left.
-    pub open: Option<Open>,
+    pub open: Option<OpenSpan>,
 }
 
 /// Where a channel's gap is open.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Open {
+pub struct OpenSpan {
     /// The trial.
     pub trial: usize,
     /// Start and end there \[s\].
@@ -46,9 +46,9 @@ const PIECE: f64 = 1.0;
 const TOLERATED: f64 = 0.1;
 /// Standard normal quantile of the test's level, 0.001 for each channel.
 const LEVEL: f64 = 3.09;
-/// Times its floor above which a gap is plain to see,
+/// Ratio to its floor above which a gap counts as clear,
 const PLAIN: f64 = 1.5;
-/// and standard deviations of the floor that it must exceed it by then: a reader of the table sees no more.
+/// and standard deviations of the floor that it must exceed it by: the table shows no more.
 const UNCERTAIN: f64 = 1.0;
 
 /// A piece of a trial: its mean square, and when it starts and ends \[s\].
@@ -62,10 +62,10 @@ struct Piece {
 /// The gap of every channel on the test trials.
 ///
 /// The mean square left on the test trials is compared with that of the deviations of these trials from the mean of their repeats (of other
-/// movements where no test trial has a repeat). Both are means over pieces of a second; the scatter of the pieces tells how many degrees of
-/// freedom each has (Satterthwaite 1946). A gap is open where their ratio, less what is tolerated, exceeds the 0.999 quantile of Fisher's
-/// distribution (cube-root approximation of Wilson and Hilferty 1931, Paulson 1942). Few pieces decide little at that level: what anybody
-/// sees in the table, a gap half as large again as its floor and more than its standard deviation above it, is open as well.
+/// movements where no test trial has a repeat). Both are means over pieces of a second; the scatter of the pieces gives the degrees of
+/// freedom of each (Satterthwaite 1946). A gap is open where their ratio, less what is tolerated, exceeds the 0.999 quantile of Fisher's
+/// distribution (cube-root approximation of Wilson and Hilferty 1931, Paulson 1942). Few pieces decide little at that level: a gap that is
+/// clear in the table, half as large again as its floor and more than its standard deviation above it, is open as well.
 pub fn held_out(trials: &[Left]) -> Vec<Gap> {
     let channels = trials
         .iter()
@@ -100,7 +100,7 @@ fn channel(trials: &[Left], c: usize) -> Gap {
     let missing = tests.iter().find(|&&t| trials[t].residuals.is_none());
     let open_everywhere = |&trial: &usize| {
         let end = trials[trial].counted.len() as f64 / trials[trial].rate;
-        Open {
+        OpenSpan {
             trial,
             span: (0.0, end),
             size: f64::INFINITY,
@@ -191,7 +191,7 @@ fn floor(trials: &[Left], c: usize, test: bool) -> Option<(f64, Freedom)> {
         .map(|p| (p.square - square) * (p.square - square))
         .sum::<f64>();
     let variance = scatter / (count - 1.0).max(1.0);
-    // A piece has at least one degree of freedom, and a single one tells of no scatter.
+    // A piece has at least one degree of freedom, and a single one has no scatter.
     let each = if variance > 0.0 {
         2.0 * square * square / variance
     } else {
@@ -234,7 +234,7 @@ fn mean<'p>(pieces: impl Iterator<Item = &'p Piece>) -> Option<f64> {
 }
 
 /// The run of pieces that exceeds the floor by most, and by how much.
-fn worst(trial: usize, pieces: &[Piece], floor: f64) -> Option<(f64, Open)> {
+fn worst(trial: usize, pieces: &[Piece], floor: f64) -> Option<(f64, OpenSpan)> {
     let allowed = floor * (1.0 + TOLERATED) * (1.0 + TOLERATED);
     let mut best: Option<(f64, usize, usize)> = None;
     let (mut sum, mut start) = (0.0, 0);
@@ -252,7 +252,7 @@ fn worst(trial: usize, pieces: &[Piece], floor: f64) -> Option<(f64, Open)> {
         let size = libm::sqrt(mean(own.iter()).unwrap_or(0.0));
         (
             sum,
-            Open {
+            OpenSpan {
                 trial,
                 span: (own[0].span.0, own[own.len() - 1].span.1),
                 size,
@@ -272,7 +272,7 @@ fn fisher(ratio: f64, above: f64, below: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Numbers between −1 and 1 that look random.
+    /// Pseudo-random numbers between −1 and 1.
     fn noise(seed: u64, count: usize) -> Vec<f64> {
         let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
         let next = |_| {
@@ -321,7 +321,7 @@ mod tests {
         assert_eq!(held_out(&trials)[0].open.map(|o| o.trial), Some(5));
     }
 
-    /// Three seconds of each trial tell little at the level of the test.
+    /// Three seconds of each trial are little data at the level of the test.
     #[test]
     fn a_gap_that_anybody_sees_is_open() {
         let open = |bump: f64| {

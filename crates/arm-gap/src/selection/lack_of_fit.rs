@@ -5,7 +5,7 @@ use crate::data::prepared_session::PreparedSession;
 use crate::selection::fit::Fitted;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
-/// Rows whose squares are summed to see how much such sums scatter: about a second.
+/// Rows whose squares are summed to estimate the scatter of such sums: about a second.
 const RUN: usize = 12;
 
 /// Lack of fit against pure error.
@@ -13,8 +13,8 @@ const RUN: usize = 12;
 pub struct LackOfFit {
     /// Variance of what repeats have in common over the variance of what they differ in, both for each degree of freedom.
     pub ratio: f64,
-    /// The ratio less one in its standard deviations, of which a second of what repeats differ in tells how large they are; not a
-    /// number without repeats.
+    /// The ratio minus one in its standard deviations, which are estimated from seconds of the differences of repeats; NaN
+    /// without repeats.
     pub z: f64,
     /// What repeats have in common beyond the noise, as a sum of squares.
     pub excess: f64,
@@ -33,8 +33,8 @@ impl LackOfFit {
     }
 }
 
-/// Lack of fit of a hypothesis over the groups of repeats. Movements whose path between the samples of the robot is not known tell none:
-/// what the robot does there is the same in every repeat.
+/// Lack of fit of a hypothesis over the groups of repeats. Movements with an unknown path between the samples of the robot have none:
+/// that path is the same in every repeat.
 pub fn lack_of_fit<const N: usize>(
     prepared: &PreparedSession<N>,
     point: &LinearizationPoint<N>,
@@ -80,7 +80,7 @@ pub fn lack_of_fit<const N: usize>(
             let channels = differ.chunks_exact(valid_segments.len());
             let each = channels.flat_map(|channel| channel.chunks_exact(RUN));
             let sums = each.map(|run| (run.iter().sum::<f64>(), n - 1.0));
-            // Where rest takes a component of the force there is nothing to see.
+            // Where rest removes a component of the force, nothing is compared.
             runs.extend(sums.filter(|(sum, _)| *sum > 0.0));
         }
         common_dof += free;

@@ -1,4 +1,4 @@
-//! How well movements that were not made yet would tell two explanations apart.
+//! How well new movements would distinguish two explanations.
 
 use arm_core::effect::Effect;
 use arm_ident::regression::trial::Trial;
@@ -22,7 +22,7 @@ pub struct Contest<'a, const N: usize> {
     named: Hypothesis<N>,
     /// `None` for one that the trials that were made do not show.
     rivals: Vec<Option<Rival<N>>>,
-    /// What the trials that were made tell, for every rival.
+    /// Distances from the measured trials, for every rival.
     made: Vec<Vec<Cluster>>,
 }
 
@@ -57,7 +57,7 @@ impl<'a, const N: usize> Contest<'a, N> {
             .iter()
             .map(|(effect, free)| {
                 let mut candidate = Candidate::again(&prepared, &given, *effect, free)?;
-                // Only what the data tell counts.
+                // Only distances that the data determine count.
                 candidate.expected.clear();
                 Some(Rival {
                     hypothesis: with(*effect),

@@ -18,10 +18,10 @@ use arm_numerics::statistics::distributions::chi_square_tail;
 
 /// Share of all that is explained that an effect must explain, whatever the others are.
 pub(crate) const FLOOR: f64 = 2e-5;
-/// The same without repeats: what sensors and a rigid model get wrong cannot be told from noise then, and an effect may be no more
-/// than what comes nearest to it.
+/// The same without repeats: errors of sensors and of a rigid model cannot be distinguished from noise then, and an effect may be no
+/// more than the best approximation of them.
 const FLOOR_UNREPEATED: f64 = 0.03;
-/// The same of what is left when all are named: a name for a small part of what cannot be explained would be a guess.
+/// The same of what is left when all are named: a name for a small part of an unexplained residual is unreliable.
 const OF_WHAT_IS_LEFT: f64 = 0.2;
 /// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
 pub(crate) const TIE: f64 = 10.0;
@@ -34,8 +34,8 @@ const EXCHANGES: usize = 4;
 /// and where it explains more by a tie or more: each time less is left, so that this ends by itself.
 const CLEAR_EXCHANGES: usize = 16;
 
-/// Part of what a law misses that an effect in another place can stand for: what misses acts in the joint of the law, and seldom
-/// looks like something else.
+/// Part of the error of a law that an effect in another place can explain: the error acts in the joint of the law, and seldom
+/// resembles another effect.
 const ELSEWHERE: f64 = 0.25;
 /// The same of what swings there: it has one frequency and is alike in every movement, and what a law misses is neither.
 const SWINGING: f64 = 0.05;
@@ -58,8 +58,8 @@ fn mimicked(effect: &Effect<f64>, by: &Effect<f64>, gain: f64) -> f64 {
     by.kind.prior().missed * gain * part
 }
 
-/// The most that an effect may explain without being there beside named ones that together explain so much: each by itself what it gained when
-/// it was judged.
+/// The most that an absent effect may explain beside named ones that together explain so much: of each by its gain in the last
+/// comparison.
 pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explained: f64) -> f64 {
     let each = named
         .iter()
@@ -69,35 +69,35 @@ pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explain
 
 /// One effect that was named.
 #[derive(Clone, Debug)]
-pub struct Named {
+pub struct NamedEffect {
     /// Its place in the hypothesis.
     pub slot: usize,
-    /// Probability of such a gain by chance, with all candidates that were asked.
+    /// Probability of such a gain by chance, with all candidates that were tested.
     pub p_value: f64,
     /// What it gains, in units of twice the log-likelihood as the data scatter.
     pub gain: f64,
     /// Share of what can be explained that is lost without it.
     pub share: f64,
     /// What would explain the same: the candidate, and how much worse it does.
-    pub alternatives: Vec<Alternative>,
+    pub alternatives: Vec<FittedAlternative>,
 }
 
-/// Another effect that would explain what a named one does.
+/// Another effect that explains the same as a named one.
 #[derive(Clone, Debug)]
-pub struct Alternative {
-    /// The question that it answers.
+pub struct FittedAlternative {
+    /// Its candidate.
     pub candidate: Candidate,
     /// The effect as it fits best.
     pub effect: Effect<f64>,
     /// How much worse it explains the data, in units of twice the log-likelihood.
     pub worse: f64,
-    /// Squared cosine between what the two would show.
+    /// Squared cosine between the responses to the two.
     pub likeness: f64,
 }
 
 /// An alternative, fitted.
 pub(crate) struct Rival<const N: usize> {
-    pub alternative: Alternative,
+    pub alternative: FittedAlternative,
     pub fitted: Fitted<N>,
 }
 
@@ -144,7 +144,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         ))
     }
 
-    /// A fitted hypothesis without each of its effects, which are told what they gain.
+    /// A fitted hypothesis without each of its effects, whose gains are set.
     fn without_each(
         &self,
         fitted: &mut Fitted<N>,
@@ -201,7 +201,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
             let base = self.gains_of_base(&point, &fitted)?;
             let without = self.without_each(&mut fitted, &point)?;
-            // Without repeats nothing tells how large the noise is: an effect must also foretell parts of the movement from others.
+            // Without repeats the noise level is unknown: an effect must also predict parts of the movement from others.
             let foretold = match self.repeated {
                 true => None,
                 false => Some(self.foretold(&point, &fitted)?),
@@ -247,7 +247,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         calibrated: &Fitted<N>,
         (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
         progress: Progress<'_>,
-    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>, Vec<Named>), GapError> {
+    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>, Vec<NamedEffect>), GapError> {
         let mut exchanges = 0;
         'again: loop {
             let mut named = Vec::new();
@@ -271,7 +271,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 )?;
                 let gain = fitted.asked[slot].gained.min(f64::MAX);
                 let rivals = match &library {
-                    // Of what cannot be followed without it nothing can be said.
+                    // Where the run cannot be followed without it, its gain is unknown.
                     Some(library) if less.cost.is_finite() => {
                         let place = (slot, less, twin.as_ref());
                         let found = self.rivals(&fitted, place, (&point, library), scale);
@@ -279,7 +279,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     }
                     _ => Vec::new(),
                 };
-                // A shape that is refined may stand for what the law of another one misses.
+                // A shape that is refined may explain the error of the law of another one.
                 let bent = self.mimicked_beside((&fitted, slot, less), &[], &point);
                 let better = rivals.iter().find(|r| {
                     let clear = r.alternative.worse < -TIE;
@@ -295,7 +295,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     let Fitted {
                         hypothesis, asked, ..
                     } = better.fitted.clone();
-                    // What can be followed but not simulated is no answer.
+                    // A solution that can be followed but not simulated is refused.
                     if let Ok(settled) = self.settle(hypothesis, asked) {
                         // Others may have stood for what the former one missed.
                         (fitted, point) = self.pruned(settled, calibrated, scale)?;
@@ -304,7 +304,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 let candidate = &fitted.asked[slot];
                 let chance = chi_square_tail(gain / scale, candidate.width());
-                named.push(Named {
+                named.push(NamedEffect {
                     slot,
                     p_value: (asked * chance).min(1.0),
                     gain: gain / scale,
@@ -322,14 +322,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         rivals: Vec<Rival<N>>,
         own: &Candidate,
         gain: f64,
-    ) -> Vec<Alternative> {
+    ) -> Vec<FittedAlternative> {
         let all = rivals.into_iter().map(|r| r.alternative);
         all.filter(|a| a.worse <= self.tie(own, gain)).collect()
     }
 
     /// How much worse another effect may explain the data and still be an alternative to one that gained so much.
     ///
-    /// Without repeats nothing tells a law that is not exact from another one: what its kind may miss of what it shows decides nothing.
+    /// Without repeats an inexact law cannot be distinguished from another one: a difference below the possible error of its kind decides nothing.
     fn tie(&self, own: &Candidate, gain: f64) -> f64 {
         match self.repeated {
             true => TIE,
@@ -339,12 +339,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// Whether another effect takes the place of a named one.
     ///
-    /// The better one does, when it earns the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
+    /// The better one does, when its gain exceeds the price of the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
     /// one with fewer parameters or, with as many, the one that stands before it in the catalogue: an intricate one bends itself to
     /// what sensors and a rigid model get wrong.
     pub(crate) fn takes_over(
         &self,
-        rival: &Alternative,
+        rival: &FittedAlternative,
         (own, gain): (&Candidate, f64),
         bent: f64,
     ) -> bool {
@@ -370,8 +370,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// Other effects in the place of one, fitted, the best first.
     ///
-    /// Two things speak for another effect: what it explains once all is refitted without the named one, and how well it stands for
-    /// that one where all is as it was fitted. The first is blind where the refitting has gone to its bounds, the second where much
+    /// Two criteria select another effect: what it explains once all is refitted without the named one, and how well it replaces
+    /// that one where all is as it was fitted. The first fails where the refit is at its bounds, the second where much
     /// else changes with the exchange.
     pub(crate) fn rivals(
         &self,
@@ -436,7 +436,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
             let likeness = twin.map_or(0.0, |t| score_test.likeness(t.place, member));
             Some(Rival {
-                alternative: Alternative {
+                alternative: FittedAlternative {
                     candidate: asked,
                     effect,
                     worse,
@@ -486,7 +486,7 @@ mod tests {
 
     use super::*;
 
-    /// Dry friction stands for a family of laws and may miss 3 %: what is near its joint may be that, elsewhere a quarter of it.
+    /// Dry friction represents a family of laws with an error up to 3 %: what is near its joint may be that, elsewhere a quarter of it.
     #[test]
     fn an_effect_must_explain_more_than_the_law_of_another_misses() {
         let friction = Effect::<f64>::new(Kind::Coulomb, 1);

@@ -1,7 +1,7 @@
-//! The passive base of an arm in the simulation: which of the laws that measured motion suggests it needs, and which of them are named.
+//! The passive base of an arm in the simulation: which of the laws suggested by measured motion it needs, and which of them are named.
 //!
-//! The closed chain is simulated with the base that was identified from measured motion. Its numbers stay free with every question,
-//! and are judged last.
+//! The closed chain is simulated with the base that was identified from measured motion. Its parameters stay free with every candidate,
+//! and its laws are selected last.
 
 use arm_core::effect::{Effect, Kind, Place};
 use arm_ident::regression::unknown::spring;
@@ -16,7 +16,7 @@ use crate::data::session::Session;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
-use crate::selection::model_selection::{Alternative, Named, TIE};
+use crate::selection::model_selection::{FittedAlternative, NamedEffect, TIE};
 use crate::selection::passive_base_evidence::{ODDS, STAYS, Term, crossed_joints, least_of};
 use crate::selection::search_state::Settled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -31,12 +31,12 @@ const TURNS: usize = 4;
 pub(crate) struct BaseLaw<const N: usize> {
     /// Its place in the base.
     pub base: usize,
-    /// The question that it answers.
+    /// Its candidate.
     pub question: Candidate,
     /// Square of its first parameter in standard deviations.
     pub gain: f64,
     /// What does as well in its joint.
-    pub alternatives: Vec<Alternative>,
+    pub alternatives: Vec<FittedAlternative>,
     /// The hypothesis in which something else takes its place, where that explains more.
     better: Option<Fitted<N>>,
     /// What came clearly nearer to the data with something else in its place, whatever that is.
@@ -85,8 +85,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(terms.into_iter().map(with_law).collect())
     }
 
-    /// The dry law of the base in a joint, with how much worse a fitted hypothesis does without it. A joint that sticks answers far from in
-    /// proportion to its friction, so that standard deviations do not tell what it explains.
+    /// The dry law of the base in a joint, with how much worse a fitted hypothesis does without it. The response of a sticking joint is far from
+    /// proportional to its friction, so standard deviations do not give what it explains.
     pub(crate) fn gain_of_dry_law(
         &self,
         point: &LinearizationPoint<N>,
@@ -145,9 +145,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.with_friction_at_rest(settled)
     }
 
-    /// Asks for the laws of the base once more that were dropped before anything was named: what was named since may have hidden them. They
-    /// start as measured motion has them; where much is left all laws do, as a joint that sticks can lead a fit far astray. `None` where
-    /// none comes back and nothing is gained.
+    /// Tests the laws of the base again that were dropped before anything was named, as an effect named since may have hidden them. They
+    /// start at their values from measured motion; so do all laws where much is left, as a sticking joint can make a fit diverge. `None`
+    /// where none comes back and nothing is gained.
     pub(crate) fn with_base_revived(
         &mut self,
         current: &Fitted<N>,
@@ -235,7 +235,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             } else {
                 shapes
             };
-            // A shape may stand for what the law of another one misses.
+            // A shape may explain the error of the law of another one.
             let bent = self.mimicked_beside((current, slot, current), &base, point);
             if let Ok((fitted, point)) = self.settle(start, asked)
                 && fitted.cost < current.cost + f64::max(price, bent)
@@ -263,8 +263,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.measure_noise(&anchor)
     }
 
-    /// Judges the base once everything is named: laws that do not earn their names are dropped one after the other and the rest is
-    /// refitted; what stands in better for one takes its place; what does as well is its alternative.
+    /// Selects the laws of the base once everything is named: laws below their price are dropped one after the other and the rest is
+    /// refitted; an effect that explains more replaces a law; one that explains as much is its alternative.
     ///
     /// # Errors
     /// As [`PreparedSession::settle`].
@@ -303,7 +303,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.dropped[base] = true;
             match self.settle(better.hypothesis, better.asked) {
                 Ok(exchanged) => settled = exchanged,
-                // What can be followed but not simulated is no answer.
+                // A solution that can be followed but not simulated is refused.
                 Err(_) => {
                     self.dropped[base] = false;
                     return Ok((settled, laws));
@@ -390,7 +390,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(laws)
     }
 
-    /// Looks for what could stand in the place of a law of the base, which is the last of the named effects.
+    /// Searches for effects that could replace a law of the base, which is the last of the named effects.
     fn judge_base_law(
         &self,
         law: &mut BaseLaw<N>,
@@ -401,7 +401,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let slot = fitted.asked.len() - 1;
         let mut less = fitted.hypothesis.clone();
         less.named.pop();
-        // Of what cannot be followed without it nothing can be said.
+        // Where the run cannot be followed without it, its gain is unknown.
         let Ok(less) = self.fit(point, less, fitted.asked[..slot].to_vec()) else {
             return;
         };
@@ -422,7 +422,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let own = (&law.question, law.gain);
         law.better = rivals
             .iter()
-            // A law that few joints have is asked beside the base, and does not take its place.
+            // A law that few joints have is tested beside the base, and does not replace it.
             .filter(|r| r.alternative.candidate.kind().prior().passive)
             .find(|r| self.takes_over(&r.alternative, own, 0.0))
             .map(|r| r.fitted.clone());
@@ -435,7 +435,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         law: BaseLaw<N>,
         amended: &mut Fitted<N>,
         precision: &mut Precision,
-    ) -> Named {
+    ) -> NamedEffect {
         let (known, slot) = (self.session.effects.len() + law.base, amended.asked.len());
         for c in &mut precision.coordinates {
             if let Target::Known(e, p) = c.target
@@ -448,7 +448,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         amended.hypothesis.named.push(effect);
         let width = law.question.width();
         amended.asked.push(law.question);
-        Named {
+        NamedEffect {
             slot,
             p_value: chi_square_tail(law.gain, width),
             gain: law.gain,
@@ -477,7 +477,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The model as given, refitted without its base, and what it leaves; `None` where there is no base.
     ///
-    /// Where it cannot be simulated the model as given stands for it, and what it leaves is what the laws of the base gain.
+    /// Where it cannot be simulated the model as given replaces it, and its residual is the gain of the laws of the base.
     ///
     /// * `gained` - what each of them gains, in units of twice the log-likelihood
     pub(crate) fn rigid(&self, gained: &[f64]) -> Option<(Fitted<N>, LackOfFit)> {

@@ -10,10 +10,10 @@ use crate::selection::friction_at_rest::TRIED_AT_REST;
 pub(super) const STAYS: f64 = 4.0;
 /// and what it must gain at least to be named, 3: with nine such laws an arm without any has a false name in one of eighty sessions.
 const NAMED: f64 = 9.0;
-/// What speaks for a law that every passive joint has against one that few have, in units of twice the log-likelihood: odds of 20.
+/// Prior odds of a law that every passive joint has against one that few have, in units of twice the log-likelihood: odds of 20.
 pub(super) const ODDS: f64 = 6.0;
 
-/// A law of the passive base, and how clearly it stands out.
+/// A law of the passive base, and its gain.
 pub(super) struct Term {
     /// Its place in the base.
     pub base: usize,
@@ -53,8 +53,8 @@ pub(super) fn least_of<const N: usize>(
     }
 }
 
-/// Joints that a named spring over two joints crosses. Movements tell the stiffness matrix of both joints, three numbers, not the three
-/// springs and a ratio that make it: an own spring that is left out there is one of infinitely many choices, stated as if it were known.
+/// Joints that a named spring over two joints crosses. Movements determine the stiffness matrix of both joints, three numbers, not its three
+/// springs and a ratio: to leave out an own spring there is one of infinitely many equivalent choices.
 pub(super) fn crossed_joints<const N: usize>(named: &[Effect<f64>]) -> [bool; N] {
     std::array::from_fn(|j| {
         let mut crossing = named.iter().filter(|e| e.kind.crosses());

@@ -25,7 +25,7 @@ pub struct ScoreTest {
     pub spread: Vec<f64>,
     /// By how much movements differ in what each candidate gains, beyond chance; see [`unlike`].
     pub unlike: Vec<f64>,
-    /// What each candidate must earn to be named.
+    /// Gain of each candidate needed to be named.
     pub price: Vec<f64>,
     /// Misfit for each degree of freedom that no choice of candidates would take away; at least one, and one until it is measured
     /// by [`ScoreTest::scaled`].
@@ -153,12 +153,12 @@ impl ScoreTest {
         self.columns.is_empty()
     }
 
-    /// What some candidates explain together; `None` where they cannot be told apart, or one would be what it cannot be.
+    /// What some candidates explain together; `None` where they cannot be distinguished, or one would be out of its bounds.
     pub fn evaluate(&self, members: &[usize]) -> Option<Choice> {
         self.answer(members, &self.score)
     }
 
-    /// How well a candidate stands for a named effect: its part of what that one shows, and its coefficients.
+    /// How well a candidate replaces a named effect: the share of its response, and the coefficients.
     pub fn stand_in(&self, candidate: usize, twin: &Twin) -> Option<(f64, Choice)> {
         let shown = self.columns[twin.place].clone().zip(&twin.sizes);
         let mut score = vec![0.0; self.score.len()];
@@ -210,7 +210,7 @@ impl ScoreTest {
 
     /// The best choices that extend `from`, up to `depth` candidates more, by a beam of the given width.
     ///
-    /// All choices that were met are returned, the most worth first. A candidate that looks like nothing alone is met
+    /// All choices that were met are returned, the most worth first. A candidate without a gain alone is met
     /// with others beside it.
     pub fn search(
         &self,
@@ -255,7 +255,7 @@ impl ScoreTest {
 
     /// Smallest sizes of a candidate that would have been named, each alone, in the units of its free parameters.
     ///
-    /// A rest angle that is free with a size makes it easier to see, but is no size of its own.
+    /// A rest angle that is free with a size makes it easier to detect, but is no size of its own.
     pub fn smallest_seen(&self, candidate: usize, sizes: usize) -> Vec<f64> {
         let price = self.scale * self.spread[candidate] * self.price[candidate];
         let mut columns = self.columns[candidate].clone();

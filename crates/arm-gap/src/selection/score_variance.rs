@@ -4,22 +4,22 @@ use std::sync::Arc;
 
 use crate::sensitivity::normal_equations::Cluster;
 
-/// Weight of "as the noise says", in trials.
+/// Prior weight of the variance of the noise model, in trials.
 const BELIEF: f64 = 6.0;
 
-/// What one trial says of an effect.
+/// Score of an effect in one trial.
 pub struct Told {
     /// The movement; repeats share it.
     configuration: usize,
     /// Product of the residual with the effect.
     score: f64,
-    /// Variance of that product where the noise is as believed.
+    /// Variance of that product by the noise model.
     expected: f64,
 }
 
-/// What each trial says of an effect.
+/// Scores of an effect in each trial.
 ///
-/// * `weights` - columns and their weights in the effect as all movements together tell it
+/// * `weights` - columns and their weights in the effect, from all movements together
 pub fn told(clusters: &[Cluster], weights: &[(usize, f64)]) -> Vec<Told> {
     let mut all: Vec<Told> = Vec::with_capacity(clusters.len());
     for (i, c) in clusters.iter().enumerate() {
@@ -114,7 +114,7 @@ mod tests {
     }
 
     /// Two repeats whose scores, of variance 25 by the noise, are 0 and 50: 50 times what it allows with one degree of freedom, beside
-    /// six that say what the noise says.
+    /// six with the variance of the noise model.
     #[test]
     fn six_trials_as_the_noise_says_stand_beside_what_repeats_scatter() {
         let of = |trials: &[Cluster]| spread(&told(trials, &[(0, 1.0)]));

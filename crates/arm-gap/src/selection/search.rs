@@ -1,4 +1,4 @@
-//! The search for what a model lacks: ask the whole catalogue, look ahead, converge by simulation, go back.
+//! The search for missing effects: test the whole catalogue, extend choices by a beam search, converge by simulation, go back.
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
@@ -9,9 +9,9 @@ use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::conclusion::Finding;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
-use crate::selection::model_selection::{Named, mimicked_by_any};
+use crate::selection::model_selection::{NamedEffect, mimicked_by_any};
 use crate::selection::score_test::{Choice, ScoreTest};
-use crate::selection::search_state::{Progress, Ruled, SearchState, SearchStep, Settled};
+use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
 use crate::selection::set_apart::SetApart;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
@@ -21,18 +21,18 @@ const MOST: usize = 6;
 const CONTENDERS: usize = 4;
 /// Choices that are converged one after the other where none of these can be followed.
 const RESERVES: usize = 8;
-/// Effects that a choice may add in one round: what is invisible alone may be plain together.
+/// Effects that a choice may add in one round: some are significant together only.
 const AHEAD: usize = 3;
-/// Times that what was found is judged, when others have taken the places of what was named.
+/// Most comparisons of the result with alternatives, when these have replaced named effects.
 const TURNS: usize = 3;
-/// Choices that are kept while looking ahead.
+/// Width of the beam search.
 const WIDTH: usize = 12;
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Searches for what the model lacks.
     ///
-    /// First what is not the same in every trial, told by what repeats differ in; then what lasts, with a slow oscillation among it where one
-    /// is plain; then a ripple of the robot, in what is left; and whatever was set apart or found on the way is asked once more.
+    /// First effects that differ between trials, from the differences of repeats; then lasting effects, with a slow oscillation among them
+    /// where one is plain; then a ripple of the robot, in what is left; and everything that was set apart or found on the way is tested again.
     ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
@@ -102,14 +102,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// Judges what was found, and searches on where another effect took the place of one: a coarser law could have missed what is seen
-    /// beside it.
+    /// Compares the result with alternatives, and continues the search where one replaced a named effect: beside a coarser law another
+    /// effect could have been missed.
     fn judged_in_turns(
         &mut self,
         mut state: SearchState<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<(SearchState<'a, N>, Vec<Named>), GapError> {
+    ) -> Result<(SearchState<'a, N>, Vec<NamedEffect>), GapError> {
         let kinds = |f: &Fitted<N>| f.asked.iter().map(Candidate::kind).collect::<Vec<_>>();
         let mut outcomes = Vec::new();
         for turn in 1.. {
@@ -133,7 +133,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 outcomes.push(after.clone());
                 state = self.search_on(state, periodic, progress)?;
             }
-            // A search that comes back to where it was before has other effects than were judged.
+            // A search that returns to an earlier state has other effects than the last comparison.
             if state.search_trace.len() == rounds && kinds(&state.current) == after {
                 return Ok((state, named));
             }
@@ -141,7 +141,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         unreachable!("the last turn returns")
     }
 
-    /// Looks for effects that last, round by round, from a calibrated model.
+    /// Searches for lasting effects, round by round, from a calibrated model.
     pub(crate) fn search_from(
         &mut self,
         (calibrated, point): Settled<'a, N>,
@@ -207,7 +207,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 break;
             }
-            // Without repeats a second look has only its own residual to tell noise from what the model lacks.
+            // Without repeats a second search has only its own residual to distinguish noise from missing effects.
             if state.current.asked.len() >= MOST || !self.repeated {
                 break;
             }
@@ -254,7 +254,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// What was found, after rest has been left out. Stribeck's law is gone where joints move: where that leaves no dry law, rest is compared
-    /// again, since it alone tells what was found.
+    /// again, as it alone shows that law.
     fn renewed_without_rest(
         &mut self,
         state: SearchState<'a, N>,
@@ -324,12 +324,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price and possible.
     ///
-    /// Where a law comes to a shape in which it is a plainer one, the scan is asked again without it.
+    /// Where the shape of a law converges to that of a simpler one, the scan is repeated without it.
     fn round(
         &self,
         state: &SearchState<'a, N>,
         (library, score_test, room): (&Library, &ScoreTest, usize),
-    ) -> Option<(Settled<'a, N>, SearchStep)> {
+    ) -> Option<(Settled<'a, N>, SearchRound)> {
         let current = &state.current;
         // Less than every effect must explain need not be converged.
         let explained = state.calibrated.cost - current.cost;
@@ -347,12 +347,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let fresh = |members: &[usize], c: usize| {
                 let candidate = &library.candidates[c];
                 let is_plainer = |other: &Candidate| other.is_same_effect(&candidate.effect);
-                // All that is asked of what swings has the same frequency and phase: one thing makes it.
+                // All oscillating candidates have the same frequency and phase: they have one cause.
                 let is_asked = |other: &Candidate| {
                     let swings = |c: &Candidate| c.kind().prior().nature.swings();
                     other.is_same_question(candidate) || swings(other) && swings(candidate)
                 };
-                // Families before members: two laws of a family bend to what one of them shows. A second one is asked for in a round of its own.
+                // Families before members: two laws of a family together fit the effect of one. A second one is tested in a separate round.
                 let is_kin = |other: &Candidate| {
                     is_asked(other) || other.is_of_family_in_joint(&candidate.effect)
                 };
@@ -382,9 +382,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let Converged { worthy, tried, .. } = &mut converged;
         tried.sort_by(|a, b| b.1.total_cmp(&a.1));
         worthy.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // What can be followed but not simulated is no answer.
+        // A solution that can be followed but not simulated is refused.
         converged.worthy.into_iter().find_map(|(_, better)| {
-            let step = SearchStep {
+            let step = SearchRound {
                 tried: converged.tried.clone(),
                 before: current.cost,
                 after: better.cost,
@@ -443,7 +443,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
         point: &LinearizationPoint<N>,
     ) -> Option<Fitted<N>> {
-        /// Shares of the first-order coefficients that are tried: a strong effect answers with less than it would to first order.
+        /// Shares of the first-order coefficients that are tried: the response to a strong effect is smaller than to first order.
         const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
         let mut all = current.asked.clone();
         all.extend_from_slice(asked);
@@ -525,9 +525,9 @@ fn contenders(choices: &[Choice], library: &Library) -> (Vec<Choice>, Vec<Choice
     (best, reserves)
 }
 
-/// Whether a sensor is far from what was promised.
+/// Whether a sensor is far outside its tolerance.
 ///
-/// * `sensors` - how far each is off, in standard deviations of the promise
+/// * `sensors` - how far each is off, in standard deviations of the tolerance
 fn is_beyond_promise(mut sensors: impl Iterator<Item = f64>) -> bool {
     /// Standard deviations beyond which a sensor is far: one in twenty by chance.
     const FAR: f64 = 2.0;

@@ -1,4 +1,4 @@
-//! How far a search is, and what it tells.
+//! State and progress of a search.
 
 use arm_core::effect::Effect;
 
@@ -10,7 +10,7 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// One round of the search.
 #[derive(Clone, Debug)]
-pub struct SearchStep {
+pub struct SearchRound {
     /// What was added, best first: the candidates and what they gained.
     pub tried: Vec<(Vec<Candidate>, f64)>,
     /// Cost before it.
@@ -19,7 +19,7 @@ pub struct SearchStep {
     pub after: f64,
 }
 
-/// What was asked for and not named: what it would still explain, and the smallest size that would have been named.
+/// A candidate that was not named: what it would still explain, and the smallest size that would have been named.
 #[derive(Clone, Debug)]
 pub struct Ruled {
     /// The effect.
@@ -34,7 +34,7 @@ pub struct Ruled {
     pub smallest: Vec<f64>,
 }
 
-/// What a search tells while it works: what it does, and how far it is (0 to 1). [`GapError::Stopped`] in answer ends the search.
+/// Receiver of progress: the current step, and the share that is done (0 to 1). Returning [`GapError::Stopped`] ends the search.
 pub type Progress<'a> = &'a (dyn Fn(&str, f64) -> Result<(), GapError> + Sync);
 
 /// A fitted hypothesis with the simulation that it was followed from.
@@ -48,7 +48,7 @@ pub(crate) struct SearchState<'a, const N: usize> {
     pub before: LackOfFit,
     pub current: Fitted<N>,
     pub point: LinearizationPoint<'a, N>,
-    pub search_trace: Vec<SearchStep>,
+    pub search_trace: Vec<SearchRound>,
     pub ruled: Vec<Ruled>,
     /// Number of candidates.
     pub asked: f64,
@@ -60,7 +60,7 @@ pub(crate) struct SearchState<'a, const N: usize> {
 }
 
 impl<const N: usize> SearchState<'_, N> {
-    /// Bars what was asked, has shapes and is named no more; whether there is something that was not barred before.
+    /// Bars candidates with shapes that are no longer named; whether one was not barred before.
     pub fn bar_lost(&mut self, asked: Vec<Candidate>) -> bool {
         let known = self.barred.len();
         add_lost(&mut self.barred, asked, &self.current.asked);
@@ -86,7 +86,7 @@ impl<const N: usize> SearchState<'_, N> {
     }
 }
 
-/// Adds those with shapes that were asked and are named no more.
+/// Adds candidates with shapes that are no longer named.
 fn add_lost(barred: &mut Vec<Candidate>, asked: Vec<Candidate>, named: &[Candidate]) {
     for one in asked.into_iter().filter(|one| one.shapes() > 0.0) {
         let same = |other: &Candidate| other.is_same_effect(&one.effect);

@@ -1,4 +1,4 @@
-//! What is not the same in every trial: rhythms, told by what repeats differ in, and disturbances of single trials.
+//! Effects that differ between trials: rhythms, from the differences of repeats, and disturbances of single trials.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ const DISTURBANCES: usize = 4;
 pub(crate) struct SetApart<const N: usize> {
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
-    /// Frequency \[Hz\] and phase \[rad\] of what swings slowly and in phase in all trials, which is asked like other effects.
+    /// Frequency \[Hz\] and phase \[rad\] of a slow oscillation with one phase in all trials, which is tested like other effects.
     pub periodic: Option<[f64; 2]>,
     /// The courses as they were measured.
     pub measured: Vec<Arc<Course<N>>>,
@@ -36,7 +36,7 @@ impl<const N: usize> SetApart<N> {
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// Sets apart what is not the same in every trial: a rhythm, told by what repeats differ in, and disturbances of single trials.
+    /// Sets apart effects that differ between trials: a rhythm, from the differences of repeats, and disturbances of single trials.
     pub(crate) fn set_apart(
         &mut self,
         mut settled: Settled<'a, N>,
@@ -52,8 +52,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.disturbances(settled, &mut apart.trial_specific, &[])
     }
 
-    /// Asks for a rhythm once more when something was named: what rang may have been that; that may have hidden a rhythm; and how an
-    /// arm answers one depends on what was named.
+    /// Tests for a rhythm again when an effect was named: the oscillation may have been that effect; the effect may have hidden a
+    /// rhythm; and the response to a rhythm depends on it.
     pub(crate) fn rhythm_asked_again(
         &mut self,
         state: SearchState<'a, N>,
@@ -93,7 +93,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// Looks for what swings in phase in all trials, which repeats do not differ by, in what is left, and searches once more beside it.
+    /// Searches the residuals for oscillations with one phase in all trials, which repeats share, and searches once more beside them.
     ///
     /// A fast swing may hide a slow one, and a slow one a fast one.
     pub(crate) fn rhythms_in_phase(
@@ -112,7 +112,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(state)
     }
 
-    /// Sets one swing in phase apart; whether there is one. Only one slow swing is asked for.
+    /// Sets one oscillation in phase apart; whether there is one. Only one slow oscillation is searched for.
     fn sets_apart_in_phase(
         &mut self,
         state: &SearchState<'a, N>,
@@ -147,7 +147,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// Asks for disturbances of single trials once more when something was named: what looked like one may have been that.
+    /// Tests for disturbances of single trials again when an effect was named, which may have been taken for one.
     pub(crate) fn disturbances_asked_again(
         &mut self,
         mut state: SearchState<'a, N>,

@@ -12,7 +12,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course};
 use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
-use crate::sensitivity::newton::{Missing, newton, slide};
+use crate::sensitivity::newton::{MissingTorque, newton, slide};
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;
 
@@ -96,7 +96,7 @@ impl<const N: usize> Linear<'_, N> {
     }
 }
 
-/// Changes of angle \[rad\] and speed \[rad/s\] by which slopes are told.
+/// Increments of angle \[rad\] and speed \[rad/s\] for difference quotients.
 const NUDGE: (f64, f64) = (1e-7, 1e-5);
 
 /// How far angles, speeds and accelerations of another plant are from those of the run.
@@ -186,7 +186,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             for j in (0..N).filter(|&j| !held[j]) {
                 there.friction[j] = 0.0;
             }
-            Missing {
+            MissingTorque {
                 torque: error - there.torque - friction,
                 speed: state.q + angle - near,
                 there,
@@ -219,7 +219,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         }
     }
 
-    /// Makes a step; what the equation of motion says at its end, and whether it is solved.
+    /// Makes a step; the balance of the equation of motion at its end, and whether it is solved.
     pub fn step(
         &mut self,
         instant: &Instant<N>,
@@ -233,7 +233,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         let (next, found, exact) = if self.dry {
             let missing = |next: &Joints<f64, N>| {
                 let there = there(next);
-                Missing {
+                MissingTorque {
                     torque: error - there.torque,
                     speed: instant.state.qd + instant.speed_with(next),
                     there,

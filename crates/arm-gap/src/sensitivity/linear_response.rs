@@ -1,6 +1,6 @@
 //! Responses of a led arm to small changes, along a run that is linearised.
 //!
-//! A change of the rig, an effect or the handle's path leaves a torque over in the equation of motion of the run. The arm answers it as a
+//! A change of the rig, an effect or the handle's path leaves a residual torque in the equation of motion of the run. The arm responds as a
 //! linear system with coefficients that follow the run. A hundred candidates cost less than one simulation each.
 
 use arm_core::effect::{Effect, dry_friction, resisting_besides_dry};
@@ -14,7 +14,7 @@ use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::origin::Origin;
 use crate::sensitivity::plant::{Balance, Hand, Plant, balance, hands};
 
-/// A change of a hypothesis whose response is asked.
+/// A change of a hypothesis whose response is computed.
 #[derive(Clone, Debug)]
 pub struct Change<const N: usize> {
     /// The hypothesis with the change made.
@@ -23,7 +23,7 @@ pub struct Change<const N: usize> {
     pub size: f64,
     /// Whether it reaches the sensors alone.
     pub sensing: bool,
-    /// Whether it moves the handle's path; told from the run itself alone.
+    /// Whether it moves the handle's path; computed from the run itself alone.
     pub moves_handle: bool,
 }
 
@@ -205,7 +205,7 @@ impl<const N: usize> Linear<'_, N> {
         steps.map(one).collect()
     }
 
-    /// What an origin says of the motion of the run.
+    /// The balance of an origin for the motion of the run.
     fn balances_from<'o>(&'o self, origin: &'o Origin<N>) -> &'o [Balance<N>] {
         if std::ptr::eq(origin, &raw const self.own) {
             return &self.balances;

@@ -1,5 +1,5 @@
-//! A hypothesis that was simulated, and everything near it from there: what other hypotheses would show, how the channels
-//! answer small changes, and the rows of the nuisances.
+//! A simulated hypothesis and its neighbourhood to first order: readings under other hypotheses, the response of the channels
+//! to small changes, and the rows of the nuisances.
 //!
 //! One trial of each movement is simulated. Repeats follow it along their own handle's path, other hypotheses follow it
 //! as changes; both cost a hundredth of a simulation.
@@ -26,7 +26,7 @@ pub struct LinearizationPoint<'a, const N: usize> {
     pub hypothesis: Hypothesis<N>,
     /// The runs along which led arms are followed, by group; nothing where torques are compared.
     pub lines: Arc<Vec<Linear<'a, N>>>,
-    /// What was told from these runs; nothing where torques are compared.
+    /// Results from these runs; nothing where torques are compared.
     runs: Option<Arc<SimulatedRuns<'a, N>>>,
     /// What the sensors would read of each group's reference, in the common band.
     shown: Vec<Channels>,
@@ -73,7 +73,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.anchored(hypothesis, self.nuisances())
     }
 
-    /// The same without rows of the nuisances, which the cost of the hypothesis itself does not ask for.
+    /// The same without rows of the nuisances, which the cost of the hypothesis itself does not need.
     ///
     /// # Errors
     /// As [`PreparedSession::linearize`].

@@ -1,6 +1,6 @@
 //! One simulated run of a led arm with the equation of motion linearised along it.
 //!
-//! A joint that set-valued friction holds in the run does not answer changes, and one that slips does so against its friction.
+//! A joint that set-valued friction holds in the run does not respond to changes, and one that slips does so against its friction.
 
 use arm_core::effect::{Effect, MAX_STATES, States, advance_states, any_state};
 use arm_core::{Joints, Plane, Reading};
@@ -26,7 +26,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Steps a second at least: movements and the band in which they are compared ask for no more, however fast one samples.
+    /// Fewest steps per second: movements and their compared band need no more at any sampling rate.
     const RATE: f64 = 100.0;
 
     fn of(rate: f64) -> Self {
@@ -128,7 +128,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         linear.hands = every.into_iter().step_by(grid.stride).collect();
         let memories = linear.memories(&plant.resisting);
         let feels_force = plant.feels_force;
-        // Effects that are asked later may feel them.
+        // Effects that are tested later may depend on them.
         linear.own.plant.feels_force = true;
         linear.balances = linear.balances_of(&linear.own.plant, &memories);
         linear.own.plant.feels_force = feels_force;
@@ -178,7 +178,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         out
     }
 
-    /// What another plant says of the motion of the run at every step, led as the run is.
+    /// The balance of another plant for the motion of the run at every step, led as the run is.
     ///
     /// * `memories` - the states of its effects along the run
     pub(super) fn balances_of(
@@ -311,7 +311,7 @@ fn cubic(samples: &[Plane<f64>], place: f64) -> Plane<f64> {
     })
 }
 
-/// The inverse of a slope for the joints that nothing holds; those that are held answer nothing.
+/// The inverse of a slope for the joints that nothing holds; zero for those that are held.
 fn inverse_of_free<const N: usize>(
     slope: &SMatrix<f64, N, N>,
     held: &[bool; N],

@@ -21,7 +21,7 @@ pub(super) struct Solved<const N: usize> {
 /// smooth or small; then with slopes of its own and shorter steps, for friction that reverses and a contact that opens.
 ///
 /// * `missing` - the torque missing at an unknown
-/// * `nudge` - a change of the unknown that tells a slope
+/// * `nudge` - increment of the unknown for a difference quotient
 pub(super) fn newton<const N: usize>(
     start: Joints<f64, N>,
     [first, second]: [&SMatrix<f64, N, N>; 2],
@@ -96,12 +96,12 @@ pub(super) fn newton<const N: usize>(
 }
 
 /// What is missing at an unknown where joints have dry friction.
-pub(super) struct Missing<const N: usize> {
+pub(super) struct MissingTorque<const N: usize> {
     /// Torque missing, friction apart \[N m\].
     pub torque: Joints<f64, N>,
     /// Speeds at the end of the step \[rad/s\].
     pub speed: Joints<f64, N>,
-    /// What the equation of motion says there.
+    /// The balance of the equation of motion there.
     pub there: Balance<N>,
 }
 
@@ -111,18 +111,18 @@ pub(super) struct Missing<const N: usize> {
 /// The torques besides friction are made linear with a slope that is corrected on the way (Broyden 1965); friction obeys its law in each
 /// linear problem.
 ///
-/// * `slope` - torque that one unit of acceleration answers, and `reach` the change of speed that it makes \[s\]
+/// * `slope` - torque per unit of acceleration, and `reach` the change of speed that it makes \[s\]
 /// * `modes` - what the friction of each joint did before, and does at the solution
 /// * `missing` - what is missing at accelerations
 pub(super) fn slide<const N: usize>(
     start: Joints<f64, N>,
     (mut slope, reach): (SMatrix<f64, N, N>, f64),
     modes: &mut [Mode; N],
-    missing: impl Fn(&Joints<f64, N>) -> Missing<N>,
+    missing: impl Fn(&Joints<f64, N>) -> MissingTorque<N>,
 ) -> Option<Slid<N>> {
-    /// Change of speed by which a slope is told \[rad/s\].
+    /// Increment of speed for a difference quotient \[rad/s\].
     const NUDGE: f64 = 1e-5;
-    /// Torque that a further step answers where the solution is good enough, and at most where no step helps \[N m\].
+    /// Residual torque at which the solution is good enough, and at most where no step helps \[N m\].
     const TOLERANCES: (f64, f64) = (1e-7, 1e-3);
     /// Most rounds: six with the slope of the start and eight with one that is taken anew.
     const ROUNDS: usize = 14;
@@ -226,7 +226,7 @@ mod tests {
     fn a_joint_that_slides_sticks_where_friction_holds_what_pulls_it() {
         // Unit inertia, friction up to 1 N m, steps of 0.01 s, speed 0 before.
         let slid = |pull: f64| {
-            let missing = |next: &Joints<f64, 1>| Missing {
+            let missing = |next: &Joints<f64, 1>| MissingTorque {
                 torque: Joints::repeat(pull - next[0]),
                 speed: next * 0.01,
                 there: balance(1.0),

@@ -1,4 +1,4 @@
-//! Normal equations, trial by trial: what every question is answered from.
+//! Normal equations, trial by trial, from which every candidate is tested.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ pub struct Cluster {
     pub rows: usize,
 }
 
-/// The sum over trials, with what is known beforehand.
+/// The sum over trials, with the priors.
 #[derive(Clone, Debug)]
 pub struct Normal {
     /// `Σ AᵀA + Λ`.
@@ -146,7 +146,7 @@ pub fn solve(
 mod tests {
     use super::*;
 
-    /// Numbers between -1 and 1 that look random.
+    /// Pseudo-random numbers between -1 and 1.
     fn numbers(seed: u64, count: usize) -> Vec<f64> {
         let mut state = seed;
         (0..count)

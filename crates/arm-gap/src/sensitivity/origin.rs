@@ -1,4 +1,4 @@
-//! The hypothesis from which small changes are told.
+//! The hypothesis from which small changes are computed.
 
 use std::sync::OnceLock;
 
@@ -7,16 +7,16 @@ use arm_core::{Joints, Plane};
 use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::plant::{Balance, Plant};
 
-/// A hypothesis from which changes are told: that of the run, or one beside it.
+/// A hypothesis from which changes are computed: that of the run, or one beside it.
 pub struct Origin<const N: usize> {
     pub(super) plant: Plant<N>,
     /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
     pub(super) start: (Joints<f64, N>, Joints<f64, N>),
     /// What its sensors read of the motion of the run.
     pub(super) shown: Channels,
-    /// Force on the arm as its sensor shows it at the samples of the trial, without its errors, where that was asked.
+    /// Force on the arm as its sensor shows it at the samples of the trial, without its errors, where it was needed.
     pub(super) delayed_force: OnceLock<Vec<Plane<f64>>>,
-    /// What it says of the motion of the run, where that was asked.
+    /// Its balance for the motion of the run, where it was needed.
     pub(super) balances: OnceLock<Vec<Balance<N>>>,
 }
 

@@ -124,7 +124,7 @@ pub(super) struct State<const N: usize> {
     pub q: Joints<f64, N>,
     pub qd: Joints<f64, N>,
     pub qdd: Joints<f64, N>,
-    /// At these angles: whatever is asked of a run is asked there.
+    /// At these angles, where everything about a run is computed.
     pose: Pose<f64, N>,
 }
 
@@ -153,7 +153,7 @@ impl<const N: usize> State<N> {
         self.beside([self.q + q, self.qd + qd, self.qdd + qdd])
     }
 
-    /// The motion as the states of effects see it.
+    /// The motion as the input of the states of effects.
     pub fn motion(&self) -> Motion<f64, N> {
         let mut motion = Motion::new(self.time, self.q, self.qd);
         motion.qdd = self.qdd;
@@ -161,7 +161,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// What the equation of motion says of a state.
+/// The balance of the equation of motion for a state.
 #[derive(Clone, Copy)]
 pub(super) struct Balance<const N: usize> {
     /// Torque left over besides set-valued dry friction.
@@ -172,7 +172,7 @@ pub(super) struct Balance<const N: usize> {
     pub friction: Joints<f64, N>,
     /// Force on the arm.
     pub force: Plane<f64>,
-    /// The motion as joint effects see it.
+    /// The motion as the input of joint effects.
     pub motion: Motion<f64, N>,
 }
 

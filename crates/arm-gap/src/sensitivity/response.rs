@@ -1,4 +1,4 @@
-//! What the channels answer to a change.
+//! The response of the channels to a change.
 
 use crate::measurement_model::prediction::Channels;
 

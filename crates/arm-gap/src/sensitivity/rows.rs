@@ -25,7 +25,7 @@ struct Class {
     reference: usize,
     valid_segments: ValidSegments,
     whitening: Whitening,
-    /// Number of rows of one trial that tell anything.
+    /// Number of observable rows of one trial.
     rows: usize,
     /// Positions in the list of fitted trials.
     members: Vec<usize>,

@@ -34,7 +34,7 @@ impl Mode {
 
 /// An equation of motion that is linear in the accelerations.
 pub(super) struct LinearStep<'a, const N: usize> {
-    /// Torque that one unit of acceleration answers.
+    /// Torque per unit of acceleration.
     pub slope: &'a SMatrix<f64, N, N>,
     /// Torque that is missing, friction apart \[N m\].
     pub missing: Joints<f64, N>,

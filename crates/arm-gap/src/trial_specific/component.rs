@@ -5,7 +5,7 @@ use arm_core::effect::{Effect, Kind, MAX_PARAMETERS};
 
 use crate::candidates::candidate::price;
 
-/// Frequency below which a ripple must keep its phase in every trial and is asked like other effects \[Hz\]: movements and
+/// Frequency below which a ripple must keep its phase in every trial and is tested like other effects \[Hz\]: movements and
 /// what a model lacks of them reach that far.
 pub(crate) const SLOW: f64 = 3.0;
 

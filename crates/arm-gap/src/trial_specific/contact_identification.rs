@@ -1,7 +1,7 @@
-//! The contact, refitted to how the arm rings on it.
+//! The contact, refitted to the free vibrations of the arm on it.
 //!
 //! Effects are named in the band of the movements, where the damping of the contact hardly shows and takes on whatever laws
-//! miss. Above that band an arm that was jolted rings on its contact, which tells stiffness and damping by itself.
+//! miss. Above that band a jolted arm vibrates on its contact, which determines stiffness and damping.
 
 use std::sync::Arc;
 
@@ -46,11 +46,11 @@ struct Tuned<const N: usize> {
 }
 
 impl<const N: usize> PreparedSession<'_, N> {
-    /// A hypothesis with stiffness and damping of the contact as the ringing tells them in one fit trial of each movement.
+    /// A hypothesis with stiffness and damping of the contact from the vibrations in one fit trial of each movement.
     ///
-    /// What the band of the comparison told is where they start from and are drawn to, with the uncertainty from before; where
-    /// the ringing plainly speaks for the contact as given, that takes its place. `None` where no contact is compared, or the
-    /// ringing tells nothing better.
+    /// Start and prior mean are the values from the band of the comparison, with the uncertainty from before; where the
+    /// vibrations fit the given contact clearly better, that takes their place. `None` where no contact is compared, or the
+    /// vibrations give no improvement.
     /// * `rhythms` - what swings besides and would pass for ringing: it is taken out, with a size and phase that change slowly
     pub fn tuned(&self, start: &Hypothesis<N>, rhythms: &[Effect<f64>]) -> Option<Hypothesis<N>> {
         /// What the other start must gain, in squares of what is left: as an effect of as many parameters must.
@@ -96,7 +96,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         best.map(|b| b.hypothesis)
     }
 
-    /// Gauss and Newton's method from a start, whose contact is what is believed; `None` where a step cannot be simulated.
+    /// Gauss and Newton's method from a start, whose contact is the prior mean; `None` where a step cannot be simulated.
     fn tuned_from(&self, mut best: Tuned<N>, heard: &Heard) -> Option<Tuned<N>> {
         let coordinates: Vec<Coordinate> = self
             .session

@@ -10,7 +10,9 @@ use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{TrialSpecific, timing_of};
-use crate::trial_specific::disturbance_shape::{Asked, Explained, Shape, scatter_elsewhere, timed};
+use crate::trial_specific::disturbance_shape::{
+    CandidateDisturbance, Explained, Shape, scatter_elsewhere, timed,
+};
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// The clearest disturbance of a single trial; `None` when no trial stands out.
@@ -98,14 +100,14 @@ impl<const N: usize> PreparedSession<'_, N> {
                 (*p, row)
             };
             let rows = shape.columns.iter().map(row).collect();
-            Asked::along(shape.effect, rows, &suspect.deviation)
+            CandidateDisturbance::along(shape.effect, rows, &suspect.deviation)
         };
-        let asked: Vec<Asked> = shapes.iter().filter_map(see).collect();
-        let mut clearest: Vec<(f64, &Asked)> = Vec::new();
+        let asked: Vec<CandidateDisturbance> = shapes.iter().filter_map(see).collect();
+        let mut clearest: Vec<(f64, &CandidateDisturbance)> = Vec::new();
         let possible = asked.iter().filter(|one| self.is_possible(one, suspect));
         for one in possible {
             let gain = one.gain(&suspect.deviation) / scale;
-            let same = |(_, c): &&mut (f64, &Asked)| c.place() == one.place();
+            let same = |(_, c): &&mut (f64, &CandidateDisturbance)| c.place() == one.place();
             match clearest.iter_mut().find(same) {
                 Some(known) if known.0 >= gain => (),
                 Some(known) => *known = (gain, one),
@@ -115,7 +117,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let most = clearest.iter().fold(0.0, |m, (gain, _)| f64::max(m, *gain));
         clearest.retain(|(gain, _)| *gain > NEAR * most);
         let answer = |effect| see(&self.shape_of(point, group, effect)?);
-        let at_its_time = |(_, one): &(f64, &Asked)| {
+        let at_its_time = |(_, one): &(f64, &CandidateDisturbance)| {
             let asked = timed((*one).clone(), &suspect.deviation, answer);
             Explained::of(asked, &suspect.deviation)
         };
@@ -128,7 +130,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             let left: Vec<_> = deviations.iter().map(|d| first.asked.left_of(d)).collect();
             Some(scatter_elsewhere(on_grid, &asked, &left))
         });
-        // What is none competes all the same: where it explains most, the others only stand for it.
+        // Impossible ones compete all the same: where one explains most, the others only imitate it.
         let effects = point.hypothesis.effects();
         let is_finding = |one: &Explained| self.is_finding(&one.asked, suspect, &effects);
         let is_told = explained.first().is_some_and(is_finding);
@@ -136,10 +138,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         (explained, scale * scatter.unwrap_or(1.0))
     }
 
-    /// Whether what is asked can have happened in a trial: it deviates from all repeats by more than any of them does. Of two both deviate
-    /// alike, and the disturbed one is further from the model. And what hardly shows in the samples that are left, or in a joint that
-    /// sticks, would have to be larger than anything.
-    fn is_possible(&self, one: &Asked, suspect: &Compared) -> bool {
+    /// Whether a disturbance is possible in a trial: the trial deviates from all repeats by more than any of them does. Two trials deviate
+    /// alike, and the disturbed one is further from the model. A disturbance with little effect on the compared samples, or in a joint that
+    /// sticks, would have to be larger than its limit.
+    fn is_possible(&self, one: &CandidateDisturbance, suspect: &Compared) -> bool {
         let own = dot(&one.row, &suspect.own);
         let others: Vec<f64> = suspect.others.iter().map(|o| dot(&one.row, o)).collect();
         let centre = match others.len() {
@@ -156,11 +158,16 @@ impl<const N: usize> PreparedSession<'_, N> {
         is_furthest && one.size(&suspect.deviation).abs() < largest
     }
 
-    /// Whether what is asked is a finding in a trial: what moves within what the calibration promises of it is none, nor what dry friction
-    /// may hold.
+    /// Whether a disturbance is a finding in a trial: not if it is within the tolerance of the calibration, or if dry friction
+    /// may hold it.
     ///
     /// * `effects` - of the model that is compared
-    fn is_finding(&self, one: &Asked, suspect: &Compared, effects: &[Effect<f64>]) -> bool {
+    fn is_finding(
+        &self,
+        one: &CandidateDisturbance,
+        suspect: &Compared,
+        effects: &[Effect<f64>],
+    ) -> bool {
         let prior = one.effect.kind.prior();
         let promised = match (prior.nature, prior.promise) {
             (Nature::Slip, _) => self.session.tolerance.handle_placement,

@@ -155,9 +155,9 @@ fn within(starts: usize) -> std::ops::Range<usize> {
     10..starts.saturating_sub(10)
 }
 
-/// A disturbance that is asked for, with what it would show.
+/// A candidate disturbance, with its response.
 #[derive(Clone)]
-pub(super) struct Asked {
+pub(super) struct CandidateDisturbance {
     /// Its size is one, in the direction that explains most.
     pub effect: Effect<f64>,
     /// Parameters that are its size.
@@ -169,7 +169,7 @@ pub(super) struct Asked {
     pub square: f64,
 }
 
-impl Asked {
+impl CandidateDisturbance {
     /// A disturbance in the direction that explains most of a deviation; `None` where it would show nothing.
     ///
     /// * `rows` - what one unit of each parameter that is its size would show; one or two of them
@@ -247,14 +247,14 @@ impl Asked {
 
 /// A disturbance at the time at which it explains most.
 pub(super) struct Explained {
-    pub asked: Asked,
+    pub asked: CandidateDisturbance,
     pub size: f64,
     /// What it explains of the deviation.
     pub gain: f64,
 }
 
 impl Explained {
-    pub fn of(asked: Asked, deviation: &[f64]) -> Self {
+    pub fn of(asked: CandidateDisturbance, deviation: &[f64]) -> Self {
         let (size, gain) = (asked.size(deviation), asked.gain(deviation));
         Self { asked, size, gain }
     }
@@ -283,12 +283,12 @@ impl Explained {
 /// place.
 ///
 /// * `deviation` - what the trial differs from its repeats by
-/// * `answer` - what it would show
+/// * `answer` - its response
 pub(super) fn timed(
-    mut best: Asked,
+    mut best: CandidateDisturbance,
     deviation: &[f64],
-    answer: impl Fn(Effect<f64>) -> Option<Asked>,
-) -> Asked {
+    answer: impl Fn(Effect<f64>) -> Option<CandidateDisturbance>,
+) -> CandidateDisturbance {
     /// First and last change of the start \[s\].
     const STEPS: (f64, f64) = (0.05, 0.01);
     /// Changes of the duration, in changes of the start.
@@ -329,15 +329,19 @@ pub(super) fn timed(
 
 /// How much more than noise the shape of a disturbance finds at other times of its movement, as a ratio of variances; at least one.
 ///
-/// Joints that stick elsewhere in every repeat, and noise that is not as the autoregression has it, look like disturbances at many times.
+/// Joints that stick elsewhere in every repeat, and noise that differs from the autoregression, resemble disturbances at many times.
 ///
 /// * `one` - as it stands among `asked`
 /// * `deviations` - of the trial and its repeats, without what the disturbance itself explains: an arm rings long after a burst, and what
 ///   slips stays off
-pub(super) fn scatter_elsewhere(one: &Asked, asked: &[Asked], deviations: &[Vec<f64>]) -> f64 {
+pub(super) fn scatter_elsewhere(
+    one: &CandidateDisturbance,
+    asked: &[CandidateDisturbance],
+    deviations: &[Vec<f64>],
+) -> f64 {
     /// Nine of ten squares of a standard normal number are smaller.
     const NINE_OF_TEN: f64 = 2.706;
-    /// How long a burst is felt around it, and a slip about its start \[s\].
+    /// Duration of the response around a burst, and around the start of a slip \[s\].
     const RESPONSE_TIME: f64 = 1.0;
     let (start, duration) = one.timing();
     let long = duration.unwrap_or(0.0);
@@ -362,13 +366,13 @@ mod tests {
     use super::*;
 
     /// Bursts of 0.5 s that start every 0.1 s of 10 s, each with a row of its own.
-    fn bursts() -> Vec<Asked> {
+    fn bursts() -> Vec<CandidateDisturbance> {
         (0..95)
             .map(|k| {
                 let mut row = vec![0.0; 95];
                 row[k] = 1.0;
                 let effect = Effect::new(Kind::Voluntary, 0).with(&[1e-2, 0.1 * k as f64, 0.5]);
-                Asked {
+                CandidateDisturbance {
                     effect,
                     sizes: vec![0],
                     variances: vec![1.0],
@@ -424,7 +428,7 @@ mod tests {
             };
             let row: Vec<f64> = (0..1000).map(at).collect();
             let square = dot(&row, &row);
-            Some(Asked {
+            Some(CandidateDisturbance {
                 effect,
                 sizes: vec![0],
                 variances: vec![1.0 / square],
@@ -452,7 +456,8 @@ mod tests {
         let effect = Effect::new(Kind::HandleSlip, 0).with(&[0.0, 0.0, 2.0]);
         let rows = vec![(0, vec![2.0, 0.0, 0.0]), (1, vec![1.0, 1.0, 0.0])];
         // Three of the first and four of the second, and something that neither shows.
-        let asked = Asked::along(effect, rows, &[10.0, 4.0, 7.0]).expect("it shows something");
+        let asked = CandidateDisturbance::along(effect, rows, &[10.0, 4.0, 7.0])
+            .expect("it shows something");
         let [y, z, start, ..] = asked.effect.parameters;
         assert!((y - 0.6).abs() < 1e-12 && (z - 0.8).abs() < 1e-12 && start == 2.0);
         assert!((asked.size(&[10.0, 4.0, 7.0]) - 5.0).abs() < 1e-12);
@@ -462,7 +467,7 @@ mod tests {
             (asked.variances[0] - 0.5).abs() < 1e-12 && (asked.variances[1] - 1.0).abs() < 1e-12
         );
         let alike = vec![(0, vec![1.0, 0.0]), (1, vec![2.0, 0.0])];
-        assert!(Asked::along(effect, alike, &[1.0, 1.0]).is_none());
+        assert!(CandidateDisturbance::along(effect, alike, &[1.0, 1.0]).is_none());
     }
 
     /// What makes other times loud counts from a second before and after on, and not nearer.

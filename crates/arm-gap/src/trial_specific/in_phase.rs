@@ -1,5 +1,5 @@
-//! What swings slowly and in phase in all trials: the robot, the shoulder, a muscle. Movements have power of their own where it swings, so that
-//! it is no line in a spectrum; it is asked as other effects are, frequency by frequency.
+//! Slow oscillations with one phase in all trials: of the robot, the shoulder, a muscle. Movements have power at the same frequencies, so
+//! they are no lines in a spectrum; they are tested as other effects are, frequency by frequency.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -11,20 +11,20 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{SLOW, shapes_of};
 use crate::trial_specific::tremor_detection::UNSTEADY;
 
-/// Slowest frequency that is asked \[Hz\]: nobody breathes more slowly.
+/// Lowest frequency that is tested \[Hz\], that of slow breathing.
 const SLOWEST: f64 = 0.1;
 /// Turns of the phase over the longest trial that must be there: fewer are a drift.
 const LEAST_TURNS: f64 = 1.5;
-/// Turns of the phase, over the longest trial, between two frequencies that are asked.
+/// Turns of the phase, over the longest trial, between two frequencies that are tested.
 const TURNS_BETWEEN: f64 = 0.7;
-/// Most frequencies that are asked: of trials so long that these are not enough a line in the spectrum tells as much.
+/// Most frequencies that are tested: in longer trials a line in the spectrum shows the oscillation as well.
 const MOST_FREQUENCIES: usize = 120;
-/// [`UNSTEADY`] where joints have dry friction: a swing that turns them over changes what friction does, which no linear response knows.
+/// [`UNSTEADY`] where joints have dry friction: an oscillation that reverses them changes the friction, which no linear response contains.
 /// Movements have nothing else in common: what is no swing differs in most of its square.
 const UNSTEADY_IF_DRY: f64 = 0.3;
-/// Frequencies asked at a time: products of all their columns are kept.
+/// Frequencies tested at a time: products of all their columns are kept.
 const AT_ONCE: usize = 8;
-/// Frequencies asked to either side of the best one, and between it and the next.
+/// Frequencies tested on either side of the best one, between it and the next.
 const CLOSER: i32 = 5;
 /// Times that this is done, each time closer: a wave whose phase runs away over a trial is not alike in trials of other lengths.
 const LOOKS: i32 = 2;
@@ -52,7 +52,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         for frequencies in coarse.chunks(AT_ONCE) {
             best = better(best, self.waves_at(frequencies, (fitted, point)));
         }
-        // Between two frequencies that were asked a wave gains at most twice as much.
+        // Between two tested frequencies a wave gains at most twice as much.
         best = best.filter(|(gain, _)| gain / scale.max(1.0) > libm::log(count as f64));
         let mut apart = step;
         for _ in 0..LOOKS {

@@ -37,7 +37,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     }
 
     /// Has a rhythm in the run of every trial, with its size and phase there, and takes out of the channels what that does not show of it.
-    /// Whether that can be simulated and told.
+    /// Whether that can be simulated and compared.
     fn put_into_runs(
         &mut self,
         point: &LinearizationPoint<N>,

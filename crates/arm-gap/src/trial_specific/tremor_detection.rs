@@ -16,7 +16,7 @@ use crate::trial_specific::component::{TrialSpecific, shapes_of};
 use crate::trial_specific::spectral_line::SpectralLine;
 use arm_numerics::signal::spectrum::{Sum, line, peak};
 
-/// Where a line is looked for.
+/// Where a line is searched for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
     /// In what repeats differ by, where the model's own errors cancel: a rhythm of muscles has another phase in every trial.
@@ -33,7 +33,7 @@ const SLOWEST_LINE: f64 = 2.0;
 const SLOWEST_RIPPLE: f64 = 0.4;
 /// Fastest ripple of the robot \[Hz\]: above it the steps of encoders sound in the springs of the contact.
 const FASTEST_RIPPLE: f64 = 8.0;
-/// Gain in units of twice the log-likelihood below which a line is no rhythm: many frequencies and channels were looked at.
+/// Gain in units of twice the log-likelihood below which a line is no rhythm: many frequencies and channels are tested.
 const LEAST_GAIN: f64 = 60.0;
 /// Share of the squared sizes of a ripple over trials that may differ from one size: the robot makes the same one in every movement,
 /// a vibration of the arm follows what it does.
@@ -288,9 +288,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         })
     }
 
-    /// How much of the line some swings explain, with a size and phase of their own in every trial.
+    /// How much of the line some oscillations explain, with a separate size and phase in every trial.
     ///
-    /// * `answers` - what one unit of each column shows on each movement
+    /// * `answers` - response to one unit of each column on each movement
     pub(super) fn explain(
         &self,
         residuals: &[Channels],
@@ -404,7 +404,7 @@ pub(super) struct Explained {
 impl Explained {
     /// Whether it is plain enough to be named at a frequency \[Hz\].
     fn is_plain(&self, frequency: f64) -> bool {
-        // The steps of encoders sound in the springs of the contact: what looks like a fast ripple is that.
+        // The steps of encoders excite the springs of the contact like a fast ripple.
         let periodic = self.effect.kind.prior().nature == Nature::Periodic;
         let sounds = periodic && frequency >= FASTEST_RIPPLE;
         self.gain > LEAST_GAIN && self.share > SEEN && self.is_steady() && !sounds
@@ -523,7 +523,7 @@ mod tests {
             assert!(plain(nature, 60.1, 0.051, 5.0));
             assert!(!plain(nature, 59.9, 0.051, 5.0) && !plain(nature, 60.1, 0.049, 5.0));
         }
-        // Above 8 Hz the steps of encoders look like a ripple, and no muscle.
+        // Above 8 Hz the steps of encoders resemble a ripple, and no muscle.
         assert!(plain(Nature::Periodic, 99.0, 0.5, 7.9));
         assert!(!plain(Nature::Periodic, 99.0, 0.5, 8.0) && plain(Nature::Rhythm, 99.0, 0.5, 8.0));
     }

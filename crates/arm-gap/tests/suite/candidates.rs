@@ -1,4 +1,4 @@
-//! The catalogue as questions: what each costs, where it is asked, and what it finds.
+//! The catalogue as candidates: the price of each, where it is tested, and what it finds.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place};
 use arm_gap::candidates::candidate::{Candidate, THRESHOLD, price};

@@ -225,7 +225,7 @@ fn laws_of_the_base_are_likely_where_measured_motion_shows_them() {
         panic!("{none:?}");
     };
     assert_eq!((rest.sd, size.step), (1.0, 0.01 * size.sd));
-    // The model has a law: nothing is asked of its joints.
+    // The model has a law: nothing is added to its joints.
     assert!(quiet().with_base(1).base.is_empty());
 }
 
@@ -281,11 +281,10 @@ fn noise_is_measured_where_movements_are_repeated() {
     let prepared = PreparedSession::new(&session, 1).expect("a sound session");
     assert!(prepared.repeated);
     let point = prepared.linearize(&session.given()).expect("a run");
-    // The model is the truth: what is left of each trial is as large as the noise says.
+    // The model is the truth: the residuals of each trial are as large as the noise.
     for (place, &trial) in prepared.fitted.iter().enumerate() {
-        let rows = prepared
-            .noise
-            .whiten(&point.residuals[place], &prepared.valid_segments[trial]);
+        let rows =
+            prepared.noise.white_at(&prepared.valid_segments[trial])(&point.residuals[place]);
         let square = rows.iter().map(|v| v * v).sum::<f64>() / rows.len() as f64;
         assert!((0.5..2.0).contains(&square), "trial {trial}: {square}");
     }
@@ -311,7 +310,7 @@ fn once_the_data_are_explained_noise_is_read_off_all_trials() {
     let mean = |prepared: &PreparedSession<2>| {
         let rows = fitted.residuals.iter().zip(&prepared.fitted);
         let rows = rows.flat_map(|(left, &trial)| {
-            let all = prepared.noise.whiten(left, &prepared.valid_segments[trial]);
+            let all = prepared.noise.white_at(&prepared.valid_segments[trial])(left);
             all[all.len() / 2..].to_vec()
         });
         let (sum, count) = rows.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
@@ -328,12 +327,17 @@ fn once_the_data_are_explained_noise_is_read_off_all_trials() {
     );
 }
 
+fn whitened(noise: &Noise, thinned: &Thinned) -> Vec<f64> {
+    let whitening = noise.whitening_at(thinned.observed());
+    noise.rows(thinned.channels.clone(), &whitening)
+}
+
 #[test]
 fn noise_is_never_believed_to_be_below_a_two_thousandth_of_the_range() {
     let silent: Vec<Thinned> = vec![vec![vec![0.0; 500]; 2].into(); 8];
     let range = [2.0, 100.0];
     let noise = Noise::of(&silent, &[], &range, &[1.0; 2]).expect("noise");
-    let rows = noise.whiten_thinned(&vec![vec![1e-3; 64], vec![0.05; 64]].into());
+    let rows = whitened(&noise, &vec![vec![1e-3; 64], vec![0.05; 64]].into());
     // 5e-4 of 2 and of 100: one standard deviation each.
     for row in rows.chunks(64) {
         let mean = row.iter().sum::<f64>() / 64.0;
@@ -365,7 +369,7 @@ fn noise_that_channels_share_is_taken_for_one() {
     let noise = Noise::of(&series, &[], &[1.0; 2], &[1.0; 2]).expect("noise");
     let (mut own, mut both) = ([0.0; 2], 0.0);
     for one in &series {
-        let rows = noise.whiten_thinned(one);
+        let rows = whitened(&noise, one);
         for i in 0..100 {
             both += rows[i] * rows[100 + i] / 4000.0;
             own[0] += rows[i] * rows[i] / 4000.0;
@@ -391,7 +395,7 @@ fn without_repeats_noise_is_larger_by_as_much_as_it_is_correlated() {
     };
     let size = |series: &[Vec<Vec<f64>>]| {
         let noise = Noise::without_repeats(series, &[1.0], (&[1.0], Vec::new())).expect("noise");
-        1.0 / noise.whiten_thinned(&vec![vec![1.0; 2]].into())[1]
+        1.0 / whitened(&noise, &vec![vec![1.0; 2]].into())[1]
     };
     let (white, slow) = (size(&slow(0.0)), size(&slow(0.9)));
     assert!((white - 1.0).abs() < 0.1, "{white}");
@@ -412,7 +416,7 @@ fn samples_at_which_a_joint_with_dry_friction_rests_are_not_compared() {
     assert_eq!((prepared.dry, without.dry), ([false, true], [false; 2]));
     let rows = |p: &PreparedSession<2>| p.valid_segments[0].rows_per_channel(4);
     let (own, all) = (rows(&prepared), rows(&without));
-    // Two joints: the force still tells the component that no torque of the elbow changes.
+    // Two joints: the component of the force that no torque of the elbow changes is still observable.
     assert_eq!(own[..3], all[..3]);
     assert!(own[3] < all[3] && own[3] > 0, "{own:?} {all:?}");
     let joints = |q: &Joints<f64, 2>| q.iter().all(|v| v.is_finite());

@@ -1,4 +1,4 @@
-//! What a first look asks, and how well movements that were not made would tell explanations apart.
+//! The first-order screening, and how well new movements would distinguish explanations.
 
 use arm_core::effect::{Effect, Kind};
 use arm_gap::data::prepared_session::PreparedSession;
@@ -18,7 +18,7 @@ fn a_first_look_suspects_the_hidden_spring_most_and_names_nothing() {
     let look = prepared.look(&|_, _| Ok(())).expect("a look");
     assert!(look.calibrated.hypothesis.named.is_empty());
     assert!(look.lack.z > 6.0, "{:?}", look.lack);
-    let worth = |s: &arm_gap::selection::first_order_screening::Suspect| s.gain - s.price;
+    let worth = |s: &arm_gap::selection::first_order_screening::ScreenedCandidate| s.gain - s.price;
     assert!(look.suspects.is_sorted_by(|a, b| worth(a) >= worth(b)));
     let own = look
         .suspects
@@ -45,7 +45,7 @@ fn a_first_look_at_a_session_that_lacks_nothing_suspects_nothing() {
     assert!(look.lack.z < 4.0, "{:?}", look.lack);
 }
 
-/// The spring itself imitates a spring; another law of the joint does not, and further movements add to what tells them apart.
+/// The spring itself imitates a spring; another law of the joint does not, and further movements distinguish them better.
 #[test]
 fn movements_tell_a_spring_from_friction_and_not_from_itself() {
     let session = session(&[spring()], (1e-3, 0.1));

@@ -1,4 +1,4 @@
-//! Synthetic sessions that the other modules ask.
+//! Synthetic sessions for the other modules.
 
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Elbow, Joints, Limits, Robot, Segment, Setup, Shape};
@@ -30,7 +30,7 @@ pub fn arm() -> Chain<f64, 2> {
     .expect("a possible arm")
 }
 
-/// What the model says of its joints.
+/// The joints of the model.
 pub fn known() -> Vec<Effect<f64>> {
     let viscous = Kind::named("viscous").expect("known");
     (0..2)

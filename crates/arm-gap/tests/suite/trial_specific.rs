@@ -40,7 +40,7 @@ fn an_encoder_that_slips_is_found_with_its_trial_its_time_and_its_size() {
     assert!(found.sd[0] < 0.005 && found.gain > 100.0, "{found:?}");
 }
 
-/// A session whose hand stands further than the robot says \[m\] from 3 s of one trial on.
+/// A session whose hand is displaced from its place by the robot's angles \[m\] from 3 s of one trial on.
 fn slipped_in_the_hand(by: [f64; 2]) -> Session<2> {
     let mut session = session(&[], (1e-3, 0.1));
     let handle = session.trials[1].handle.as_mut().expect("a robot");
@@ -191,7 +191,7 @@ fn a_rhythm_that_cannot_be_put_into_the_runs_is_taken_out_of_the_channels() {
     );
 }
 
-/// In the first order of a rhythm a joint with dry friction answers as it does without one; runs with it tell its phase.
+/// To first order in a rhythm, a joint with dry friction responds as it does without one; runs with it give its phase.
 #[test]
 fn the_phase_of_a_rhythm_is_that_of_runs_where_a_joint_rubs() {
     let session = trembling();

@@ -14,10 +14,10 @@
 //! - d_j is a regression on the direction of motion in the same problem. The mean of |residual| (equation 3.32) is 0.8 σ
 //!   where there is no friction at all;
 //! - where a joint with dry friction rests or turns, friction is anything between −d_j and d_j: these rows of that joint are left
-//!   out. They would pull d_j towards zero, and X_j with it. The other joints' rows of the same samples know nothing of d_j, and stay;
+//!   out. They would bias d_j towards zero, and X_j with it. The other joints' rows of the same samples do not depend on d_j, and stay;
 //! - the same zero-phase low-pass acts on torque and regressors;
-//! - inertia, which the text neglects, counts as an error of the measurement: each step is told what the model's inertia would
-//!   have moved, so that the intervals of a movement that is not quasi-static hold the true values.
+//! - inertia, which the text neglects, counts as an error of the measurement: each step adds the effect of the model's inertia
+//!   on its estimate to the uncertainty, so that the intervals of a movement that is not quasi-static hold the true values.
 //!
 //! The joint method (`joint`) is better in every respect; the cascade is for comparison with the thesis.
 
@@ -52,7 +52,7 @@ pub struct Options {
     pub cutoff: Option<f64>,
     /// Half width of the box `l_b … u_b` around the model, in its standard deviations.
     pub bound_width: f64,
-    /// What the calibration promises: it widens the intervals, and is not refitted.
+    /// Tolerances of the calibration: they widen the intervals, and the calibration is not refitted.
     pub tolerance: Tolerance,
     /// Probability of the intervals.
     pub level: f64,
@@ -72,7 +72,7 @@ impl Default for Options {
 /// Identifies by the cascade on the trials whose role is [`Role::Fit`]; the others are only explained.
 ///
 /// Fitted effects of kind `coulomb` are the dissipative torques. The passive moment of a joint is free where
-/// `constant_moment` is fitted there, else it is pinned to zero (thesis section 3.5.2). Other fitted effects keep the
+/// `constant_moment` is fitted there, else it is zero (thesis section 3.5.2). Other fitted effects keep the
 /// values of the model. Inertia is left out, that of motors too.
 ///
 /// # Errors

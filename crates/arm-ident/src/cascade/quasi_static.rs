@@ -82,7 +82,7 @@ impl<const N: usize> Stream<N> {
         Ok(())
     }
 
-    /// All that the samples say.
+    /// The condensed problem of all samples.
     pub fn finish(self) -> Condensed<N> {
         Condensed {
             factor: self.condenser.finish(),
@@ -173,7 +173,7 @@ impl<const N: usize> Condensed<N> {
         self.factor.rows
     }
 
-    /// Wrist to shoulder, each under its bounds; see [`crate::cascade`]. A stream knows no direction of motion, so
+    /// Wrist to shoulder, each under its bounds; see [`crate::cascade`]. A stream has no direction of motion, so
     /// dissipative torques are not among the unknowns.
     ///
     /// # Errors
@@ -238,7 +238,7 @@ impl<const N: usize> Condensed<N> {
         for link in joint + 1..N {
             add_scaled(&mut z, -first[link], column(link));
         }
-        // What this link carries beyond its own unknowns: segments that are known by now, or held.
+        // Load of this link beyond its own unknowns: segments that are identified already, or held.
         let own_share: f64 = own
             .iter()
             .map(|&u| share(model, unknowns[u].source, joint) * x[u])

@@ -31,7 +31,7 @@ pub(super) struct Building<'a, const N: usize> {
     pub(super) still: Kinematics<N>,
     /// The same with speeds and accelerations, for the inertia that is neglected.
     pub(super) moving: Kinematics<N>,
-    /// Speeds that tell the direction of motion.
+    /// Speeds from which the direction of motion is computed.
     pub(super) speed: Vec<Joints<f64, N>>,
     /// Where each joint moves.
     pub(super) moves: [Vec<bool>; N],

@@ -32,7 +32,7 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Whether there is anything to find the joint's unknowns from.
+    /// Whether there are rows to estimate the joint's unknowns from.
     pub(super) fn has_data(&self) -> bool {
         self.data.rows > 0
     }
@@ -75,7 +75,7 @@ pub(super) fn step<const N: usize>(
 ) -> Result<Step, IdentError> {
     let mut data = merged(&clusters, unknowns.len())?;
     if data.rows == 0 {
-        // What neither data nor a prior know anything of stays as it is.
+        // Unknowns that neither data nor a prior determine stay as they are.
         own.retain(|&u| unknowns[u].sd.is_finite());
     }
     let level = libm::sqrt(data.residual2(&vec![0.0; x.len()])? / data.rows.max(1) as f64);
@@ -94,7 +94,7 @@ pub(super) fn step<const N: usize>(
         }
         solved = Some((posterior, active, status, variance));
         let next = residual_variance::<N>(series, x, joint)?;
-        // Data without any noise (a check on exact values) would make infinite weights.
+        // Data without noise (a check on exact values) would lead to infinite weights.
         if next <= 1e-18 * level * level {
             break;
         }

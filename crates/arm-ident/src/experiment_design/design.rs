@@ -1,7 +1,7 @@
 //! Before an experiment: a movement that shows the parameters well.
 //!
 //! The search is a (1+1) evolution strategy over waypoints with restarts (Rechenberg's rule
-//! for its step), for trapezoids at two speeds come within a few percent of optimised Fourier series.
+//! for its step), as trapezoids at two speeds come within a few percent of optimised Fourier series.
 
 use crate::error::IdentError;
 use crate::experiment_design::forecast::{Demand, Forecast, Question, Seen, Task, said};
@@ -13,19 +13,19 @@ use arm_sim::Normal;
 /// Step of the search at its start, in ranges of a joint.
 const FIRST_STEP: f64 = 0.25;
 
-/// Evaluations after which a search that gets nowhere starts anew.
+/// Evaluations without progress after which the search restarts.
 const PATIENCE: usize = 60;
 
-/// Runs of a movement that is slowed until it fits; the last is as slow as may be.
+/// Runs of a movement that is slowed until it respects the limits; the last is at the slowest pace.
 const MOST_RUNS: usize = 8;
 
-/// Share of a limit that is aimed at: the contact gives way, and what it adds does not scale.
+/// Target share of a limit: the motion that the compliant contact adds does not scale with the pace.
 const AIM: f64 = 0.99;
 
-/// The contact gives way: the arm may be this much faster than it is led.
+/// The contact is compliant: the arm may be this much faster than the commanded movement.
 const GIVING: f64 = 1.1;
 
-/// Slowest pace, relative to the one asked for: what is left of a force there, holding the arm takes.
+/// Slowest pace, relative to the requested one: the forces that remain there hold the arm against gravity.
 const LEAST_PACE: f64 = 0.1;
 
 /// What a plan must respect, and how long to search.
@@ -62,11 +62,11 @@ pub struct Allowed<const N: usize> {
 pub struct Design<const N: usize> {
     /// The movements.
     pub tasks: Vec<Task<N>>,
-    /// Of each its pace, relative to the one asked for.
+    /// Pace of each, relative to the requested one.
     pub paces: Vec<f64>,
-    /// Of each what it was slowed for, and what that is at the pace asked for; `None` where it is as fast as was asked.
+    /// For each the limit that it was slowed for, and the value at the requested pace; `None` where it is as fast as requested.
     pub slowed_for: Vec<Option<Excess>>,
-    /// What they will show.
+    /// Forecast of the estimates.
     pub forecast: Forecast,
 }
 
@@ -136,7 +136,7 @@ pub fn design<const N: usize>(
     }
 }
 
-/// By how much what was refused exceeds a limit; infinite for what no limit refused.
+/// By how much a refused movement exceeds a limit; infinite if it was not refused by a limit.
 fn excess(error: &IdentError) -> f64 {
     match error {
         IdentError::NoPlan { nearest, .. } => nearest.found / nearest.allowed,
@@ -154,7 +154,7 @@ fn score(forecast: &Forecast) -> f64 {
     libm::log(forecast.worst().max(1e-12)) + 0.2 * mean
 }
 
-/// The movements, slowed where they would exceed a limit, and what they show.
+/// The movements, slowed where they would exceed a limit, and their forecast.
 fn fitting<const N: usize>(
     question: &Question<N>,
     tasks: Vec<Task<N>>,
@@ -177,7 +177,7 @@ fn fitting<const N: usize>(
     })
 }
 
-/// A movement that fits.
+/// A movement within the limits.
 struct Slowed<const N: usize> {
     task: Task<N>,
     seen: Seen<N>,
@@ -185,7 +185,7 @@ struct Slowed<const N: usize> {
     slowed_for: Option<Excess>,
 }
 
-/// A movement as fast as is asked or, where that would exceed a limit, as fast as is allowed.
+/// A movement at the requested pace or, where that would exceed a limit, as fast as is allowed.
 fn slowed<const N: usize>(
     question: &Question<N>,
     asked: Task<N>,
@@ -226,7 +226,7 @@ fn slowed<const N: usize>(
         if pace <= least {
             return Err(refused(excess));
         }
-        // What counts is the limit that is met last.
+        // The limit that needs the slowest pace counts.
         slowed_for = exceeded(&fastest, allowed, excess.limit, 1.0).or(slowed_for);
         before = Some([pace, found.force]);
         pace = if runs + 1 == MOST_RUNS {

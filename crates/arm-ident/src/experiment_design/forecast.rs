@@ -23,9 +23,9 @@ use arm_numerics::{Condenser, Factor, Matrix};
 
 /// Step of the simulations \[s\]: the fourth-order integrator holds stiff contacts with it.
 const STEP: f64 = 1e-3;
-/// How much less is known beforehand where only the data shall speak.
+/// Factor on prior standard deviations where an estimate shall rest on the data alone.
 const HARDLY_KNOWN: f64 = 30.0;
-/// Deviation of a parameter of an effect of which nothing is known, SI unit.
+/// Prior standard deviation of a parameter of an effect, SI unit.
 const ANY_EFFECT: f64 = 30.0;
 /// A parameter that is smaller than this is known relative to this, SI unit.
 const SMALL: f64 = 0.05;
@@ -33,7 +33,7 @@ const SMALL: f64 = 0.05;
 /// Covariance of the torques of one sample \[N² m²\].
 type Covariance<const N: usize> = [[f64; N]; N];
 
-/// What the sensors do.
+/// Sampling, filtering and noise of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
     /// Samples a second \[Hz\].
@@ -63,16 +63,16 @@ pub struct Task<const N: usize> {
     pub repeats: usize,
 }
 
-/// What is asked of the data.
+/// Input of a forecast.
 #[derive(Clone, Debug)]
 pub struct Question<const N: usize> {
-    /// The assumed arm, with the effects that are to be fitted at guessed values.
+    /// The assumed arm, with the effects that are to be fitted at assumed values.
     pub model: Model<N>,
     /// The robot that has to reach the path.
     pub robot: Option<Robot<f64>>,
-    /// What the calibration promises.
+    /// Tolerances of the calibration.
     pub tolerance: Tolerance,
-    /// What the sensors do.
+    /// Sampling, filtering and noise of the sensors.
     pub accuracy: Accuracy,
 }
 
@@ -87,9 +87,9 @@ pub struct Predicted {
     pub effect: Option<usize>,
     /// Assumed value.
     pub value: f64,
-    /// Standard deviation to be expected, with what is known beforehand.
+    /// Standard deviation to be expected, with the priors.
     pub std: f64,
-    /// The same from the data alone, the calibration as promised.
+    /// The same from the data alone, the calibration within its tolerance.
     pub std_of_data: f64,
 }
 
@@ -104,7 +104,7 @@ impl Predicted {
     }
 }
 
-/// What a set of movements will give, and what it asks of the robot.
+/// Forecast of a set of movements: certainty of the parameters, and the load of the robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Forecast {
     /// Base parameters and parameters of effects.
@@ -133,10 +133,10 @@ impl Forecast {
     }
 }
 
-/// Says how well movements will show the parameters.
+/// Predicts how well movements determine the parameters.
 ///
 /// # Errors
-/// [`IdentError`] for movements that cannot be made, and when nothing is asked.
+/// [`IdentError`] for movements that cannot be made, and when nothing is to be fitted.
 pub fn forecast<const N: usize>(
     question: &Question<N>,
     tasks: &[Task<N>],
@@ -148,7 +148,7 @@ pub fn forecast<const N: usize>(
     said(question, tasks, &seen)
 }
 
-/// What simulated movements say of the parameters.
+/// The certainty of the parameters from simulated movements.
 pub(crate) fn said<const N: usize>(
     question: &Question<N>,
     tasks: &[Task<N>],
@@ -228,7 +228,7 @@ pub(crate) fn said<const N: usize>(
     })
 }
 
-/// What one movement asks of arm and robot.
+/// Load of arm and robot in one movement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Demand {
     /// Largest force on the arm \[N\].
@@ -261,7 +261,7 @@ impl Demand {
 pub(crate) struct Seen<const N: usize> {
     trial: Trial<N>,
     course: Course<N>,
-    /// What it asks of arm and robot.
+    /// Load of arm and robot.
     pub demand: Demand,
 }
 
@@ -367,7 +367,7 @@ fn condensed<const N: usize>(
     p: usize,
 ) -> Result<(Factor, Factor), IdentError> {
     let accuracy = question.accuracy;
-    // White noise through the low-pass and the decimation: each sample kept stands for so many.
+    // White noise through the low-pass and the decimation: each kept sample replaces so many.
     let step = ((accuracy.rate / (2.5 * accuracy.cutoff)) as usize).max(1) as f64;
     let mut mean = [[0.0; N]; N];
     let count: f64 = noise.iter().map(|n| n.len() as f64).sum();

@@ -1,6 +1,6 @@
-//! What a planned movement may not exceed, and what it exceeds.
+//! Limits of a planned movement, and limits that it exceeds.
 
-/// What a movement may exceed.
+/// A kind of limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
     /// [`Allowed::force`](crate::experiment_design::design::Allowed::force).
@@ -46,7 +46,7 @@ pub struct Excess {
     pub limit: Limit,
     /// What was found, in the unit of the limit.
     pub found: f64,
-    /// At which pace, relative to the one asked for.
+    /// Pace at which it was found, relative to the requested one.
     pub pace: f64,
     /// What is allowed.
     pub allowed: f64,

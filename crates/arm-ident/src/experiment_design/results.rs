@@ -1,4 +1,4 @@
-//! What a plan comes to, in the terms of files and reports: one type for Rust, Python and JSON.
+//! The result of a plan, in the terms of files and reports: one type for Rust, Python and JSON.
 
 use arm_core::effect::Effect;
 use serde::Serialize;
@@ -18,9 +18,9 @@ pub struct Prediction {
     pub joint: Option<usize>,
     /// Value assumed before the experiment, in `unit`.
     pub value: f64,
-    /// Standard deviation to be expected, with what is known beforehand, in `unit`.
+    /// Standard deviation to be expected, with the priors, in `unit`.
     pub std: f64,
-    /// The same from the data alone, within the calibration as promised, in `unit`.
+    /// The same from the data alone, the calibration within its tolerance, in `unit`.
     pub std_of_data: f64,
     /// The latter relative to the value; a parameter of an effect that is small counts as 0.05.
     pub relative: f64,
@@ -46,7 +46,7 @@ impl Prediction {
     }
 }
 
-/// What movements will show, and what they ask of the robot.
+/// Forecast of movements: certainty of the parameters, and the load of the robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Forecast {
     /// Base parameters and parameters of effects.
@@ -92,11 +92,11 @@ impl Forecast {
 pub struct Slowed {
     /// Number of the movement, from 1.
     pub movement: usize,
-    /// Its share of the speed that was asked for; of the acceleration that squared.
+    /// Its share of the requested speed; of the acceleration that squared.
     pub pace: f64,
-    /// What it would exceed if it were faster, by its name in `Limits`.
+    /// The limit that it would exceed if it were faster, by its name in `Limits`.
     pub limit: String,
-    /// What that would be at the speed that was asked for, in `unit`.
+    /// Value of that quantity at the requested speed, in `unit`.
     pub found: f64,
     /// The limit, in `unit`.
     pub allowed: f64,

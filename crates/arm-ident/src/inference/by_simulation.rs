@@ -22,7 +22,7 @@ const LEAST_SIZE: f64 = 1e-2;
 const FIRST_DAMPING: f64 = 1e-3;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e12;
-/// The estimate stands when the model of a round promises less than this share of the sum of squares.
+/// Converged when the predicted reduction of the sum of squares is less than this share of it.
 const SETTLED: f64 = 1e-10;
 /// Most rounds.
 const MOST_ROUNDS: usize = 100;

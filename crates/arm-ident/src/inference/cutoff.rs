@@ -17,7 +17,7 @@ const NEARLY_BEST: f64 = 1.1;
 
 /// The lowest cutoff with which the fit trials are explained nearly as well as with the best one \[Hz\].
 ///
-/// Judged by the residual relative to the size of the terms that have to cancel.
+/// The criterion is the residual relative to the size of the terms that have to cancel.
 ///
 /// # Errors
 /// [`IdentError`] when a trial is too short for the filter, or no solution exists.
@@ -66,7 +66,7 @@ fn condensed<const N: usize>(
             },
         )?;
     }
-    // What cannot be fitted later cannot be judged either.
+    // A cutoff that the fit will refuse is refused here too.
     clusters(&lengths)?;
     Ok(condenser.finish())
 }

@@ -23,12 +23,12 @@ pub struct Estimate {
     pub std: f64,
     /// SI unit.
     pub unit: String,
-    /// Interval at the level asked for.
+    /// Interval at the requested level.
     pub interval: (f64, f64),
     /// What the value rests on.
     #[serde(serialize_with = "word")]
     pub decided_by: Decision,
-    /// Why `std` and `interval` promise too much, where something known is wrong with what the value rests on.
+    /// Why `std` and `interval` are too small, where an assumption behind the value is known to be wrong.
     pub caveat: Option<String>,
 }
 
@@ -50,23 +50,10 @@ impl Estimate {
 pub struct Explained<const N: usize> {
     /// Index of each sample in the trial.
     pub samples: Vec<usize>,
-    /// Torques that the measurement asks for \[N m\].
+    /// Torques that follow from the measurement \[N m\].
     pub measured: Vec<Joints<f64, N>>,
     /// Torques of the fitted model \[N m\].
     pub fitted: Vec<Joints<f64, N>>,
-}
-
-impl<const N: usize> Explained<N> {
-    /// Sum of squared residuals and number of samples, for each joint.
-    pub fn square_sum(&self) -> ([f64; N], usize) {
-        let mut sum = [0.0; N];
-        for (m, f) in self.measured.iter().zip(&self.fitted) {
-            for j in 0..N {
-                sum[j] += (m[j] - f[j]) * (m[j] - f[j]);
-            }
-        }
-        (sum, self.measured.len())
-    }
 }
 
 /// The result of an identification.
@@ -80,7 +67,7 @@ pub struct Identified<const N: usize> {
     pub unknowns: usize,
     /// The unknowns and what follows from them.
     pub parameters: Vec<Estimate>,
-    /// The base parameters: what a movement of a planar chain can show at all.
+    /// The base parameters: what any movement of a planar chain can determine at most.
     pub combinations: Vec<Estimate>,
     /// Calibrations that were refitted within their tolerance.
     pub calibration: Vec<Estimate>,
@@ -100,11 +87,11 @@ pub struct Identified<const N: usize> {
     /// By how many standard deviations the inertia that the cascade neglects moves each first moment `X_j`; zeros for the joint method.
     pub neglected_inertia: Vec<f64>,
     /// Noise of each joint's speed relative to the speed itself, where the motion was measured; zero where it was simulated.
-    /// Above a few tenths friction, viscosity and inertia are biased in a way that no interval shows.
+    /// Above a few tenths, friction, viscosity and inertia have a bias that the intervals do not contain.
     pub speed_noise: Vec<f64>,
     /// Why the motion was measured where it was to be simulated if that could be done.
     pub not_simulated: Option<IdentError>,
-    /// For each trial handed in: how it is explained.
+    /// Measured and fitted torques of each trial.
     pub explained: Vec<Explained<N>>,
     /// The arm with the estimates.
     pub chain: Chain<f64, N>,

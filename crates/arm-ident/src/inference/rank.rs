@@ -1,8 +1,8 @@
-//! What a movement can tell apart: numerical rank, null space, base parameters and their grouping.
+//! Which parameters a movement distinguishes: numerical rank, null space, base parameters and their grouping.
 //!
 //! Columns are scaled first (by prior standard deviations: then a singular value above 1 means that the data beat the prior; or by the column norms:
-//! then the rank is a property of the movement alone). The rank is counted in the singular values; a column-pivoted QR factor picks base columns and says
-//! how the others hang on them, `W₂ = W₁ β` (Gautier 1991): only `x_base + β x_dependent` can be known.
+//! then the rank is a property of the movement alone). The rank is counted in the singular values; a column-pivoted QR factor picks base columns and gives
+//! the dependence of the others on them, `W₂ = W₁ β` (Gautier 1991): only `x_base + β x_dependent` can be known.
 
 use crate::error::IdentError;
 use arm_numerics::error::{check_finite, check_least, check_len, check_range};
@@ -189,23 +189,6 @@ impl RankReport {
             format!("{who} and {} trade 1{shares}", names[last])
         };
         Ok(self.trades().iter().map(line).collect())
-    }
-
-    /// The determined combinations in words, one line per base column: "m1*l1 + 0.322 m2".
-    ///
-    /// # Errors
-    /// [`NumericsError::Length`](arm_numerics::NumericsError::Length) unless there is one name a column.
-    pub fn describe_combinations(&self, names: &[&str]) -> Result<Vec<String>, IdentError> {
-        check_len("names", names.len(), self.scale.len())?;
-        let line = |combination: &Combination| {
-            let mut text = names[combination.base].to_owned();
-            for &(index, c) in &combination.others {
-                let sign = if c < 0.0 { '-' } else { '+' };
-                text = format!("{text} {sign} {} {}", short(c.abs()), names[index]);
-            }
-            text
-        };
-        Ok(self.combinations.iter().map(line).collect())
     }
 }
 

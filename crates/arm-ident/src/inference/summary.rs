@@ -1,4 +1,4 @@
-//! From a solved problem to numbers with names, intervals and what decided them.
+//! From a solved problem to named estimates with intervals and the source of each.
 
 use crate::error::IdentError;
 use crate::inference::constraint::base_parameters;
@@ -45,7 +45,7 @@ pub(crate) struct Certainty<'a> {
     pub covariance: Spread,
     /// Covariance as if no bound held, for what a bound narrows.
     pub unbounded: Spread,
-    /// What the movements can tell apart.
+    /// Which parameters the movements distinguish.
     pub report: RankReport,
     /// Number of unknowns that are not calibration; they come first.
     pub physical: usize,
@@ -59,12 +59,12 @@ pub(crate) struct Certainty<'a> {
 pub(crate) struct Spread {
     /// Of data and prior.
     pub whole: Matrix,
-    /// The part that was read off the scatter of the clusters.
+    /// The part that was estimated from the scatter of the clusters.
     pub scatter: Matrix,
 }
 
 impl Spread {
-    /// Standard deviations of a linear function of the unknowns: the whole, and the part read off the scatter.
+    /// Standard deviations of a linear function of the unknowns: the whole, and the part from the scatter.
     fn of(&self, w: &[f64]) -> Result<[f64; 2], IdentError> {
         Ok([
             standard_error(&self.whole, w)?,
@@ -250,14 +250,14 @@ impl Certainty<'_> {
     ) -> Result<Estimate, IdentError> {
         let value: f64 = w.iter().zip(self.x).map(|(w, x)| w * x).sum();
         let (held, open) = (self.covariance.of(w)?, self.unbounded.of(w)?);
-        // A bound narrows also what hangs together with the unknown that sits on it. How far that is inside nobody knows, so
-        // that neither is known better than without the bound.
+        // A bound narrows also quantities that are correlated with the unknown on it. The distance of the true value from the
+        // bound is unknown, so neither is known better than without the bound.
         let narrowed = held[0] < FREE * open[0];
         // A combination whose parts sit on a bound may still be free to move: X_j is, where m_{j+1} is not.
         let limited = w.iter().zip(&self.limited).any(|(&w, &l)| w != 0.0 && l);
         let bound = limited && narrowed;
         let [std, scatter] = if narrowed { open } else { held };
-        // Without a load every value is a ratio to the model's scale, and knows no more than that scale.
+        // Without a load every value is a ratio to the model's scale, and no more certain than that scale.
         let std = libm::hypot(std, self.scale_sd * value);
         let reach = self.quantile(std, scatter)? * std;
         let decided_by = if self.scale_sd > 0.0 && w[..self.physical].iter().any(|&v| v != 0.0) {
@@ -280,7 +280,7 @@ impl Certainty<'_> {
         })
     }
 
-    /// Correlations between the errors of linear functions of the unknowns. One that a bound holds goes with no other.
+    /// Correlations between the errors of linear functions of the unknowns. One that a bound holds has none.
     fn correlations(&self, functions: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         let (whole, p) = (&self.covariance.whole, self.x.len());
@@ -305,7 +305,7 @@ impl Certainty<'_> {
     }
 
     /// Half width of an interval in standard deviations: of so many degrees of freedom as a sum of two variances has of which one
-    /// is known (Satterthwaite 1946), so that what the prior alone tells does not widen with the few clusters.
+    /// is known (Satterthwaite 1946), so that the part of the prior does not widen with the few clusters.
     fn quantile(&self, std: f64, scatter: f64) -> Result<f64, IdentError> {
         /// Degrees of freedom from which on Student's distribution is taken as normal.
         const NORMAL: f64 = 1e9;
@@ -335,7 +335,7 @@ impl Certainty<'_> {
         })
     }
 
-    /// A nonlinear function through its gradient, of a segment from 0; decided by the weakest of what it rests on.
+    /// A nonlinear function through its gradient, of a segment from 0; its source is the weakest of its arguments.
     pub(crate) fn nonlinear(
         &self,
         value: f64,

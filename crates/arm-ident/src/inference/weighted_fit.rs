@@ -13,7 +13,7 @@ use arm_numerics::{Condenser, Factor, Matrix};
 /// Residual, relative to the torques, assumed before the first fit.
 pub(crate) const FIRST_GUESS: f64 = 0.05;
 
-/// A solved weighted problem and what is needed to say how certain it is.
+/// A solved weighted problem and what its uncertainty is computed from.
 pub(crate) struct Solved {
     /// The solution.
     pub outcome: Outcome,
@@ -37,7 +37,7 @@ pub(crate) fn weighted<const N: usize>(
     (deviations, scale_free): (&[Vec<f64>], bool),
 ) -> Result<Solved, IdentError> {
     let (mut solved, level) = first_solution::<N>(model, unknowns, fit, scale_free)?;
-    // Repeats of a simulation without noise do not scatter, and tell nothing.
+    // Repeats of a simulation without noise do not scatter, and give no estimate of noise.
     let repeated = root_mean_square(deviations.iter().flatten()) > 1e-6 * level;
     for _ in 0..2 {
         let rest = |x: &[f64]| -> Vec<Vec<f64>> {
@@ -47,7 +47,7 @@ pub(crate) fn weighted<const N: usize>(
                 .collect()
         };
         let residuals = rest(&solved.outcome.x);
-        // Data without any noise (a check on exact values) would make infinite weights.
+        // Data without noise (a check on exact values) would lead to infinite weights.
         if root_mean_square(residuals.iter().flatten()) <= 1e-9 * level {
             break;
         }
@@ -61,7 +61,7 @@ pub(crate) fn weighted<const N: usize>(
     Ok(solved)
 }
 
-/// The estimate under a first guess of white noise, and the size of the torques.
+/// The estimate under an initial value of white noise, and the size of the torques.
 pub(crate) fn first_solution<const N: usize>(
     model: &Model<N>,
     unknowns: &[Unknown],
@@ -69,7 +69,7 @@ pub(crate) fn first_solution<const N: usize>(
     scale_free: bool,
 ) -> Result<(Solved, f64), IdentError> {
     let torque = root_mean_square(fit.iter().flat_map(|p| p.iter()).flat_map(|r| r.rhs.iter()));
-    // Without a load the torques of the known model tell what is large.
+    // Without a load, torques are compared with those of the given model.
     let x0: Vec<f64> = unknowns.iter().map(|u| u.mean).collect();
     let rest: Vec<Vec<f64>> = fit
         .iter()

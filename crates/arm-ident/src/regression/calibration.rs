@@ -2,7 +2,7 @@
 //!
 //! Each imperfection is a column: its first-order influence on the left-hand side. The columns are computed from the
 //! force that the *model* predicts, never from the measured one: a column that carries the noise of the right-hand side
-//! would explain that noise, and the fit would buy it with a wrong gain and parameters shrunk to match.
+//! would explain that noise, and gain and parameters would be biased towards zero.
 
 use arm_core::effect::resisting_torque;
 use arm_core::{Joints, Plane, Pose, Scalar, gravity, inverse_dynamics, jacobian, static_torque};
@@ -24,7 +24,7 @@ pub(crate) struct Prediction<const N: usize> {
     known: usize,
 }
 
-/// The predicted force \[N\] at a sample and at those beside it; at an end the sample itself stands for what is beyond.
+/// The predicted force \[N\] at a sample and at its neighbours; at an end the sample itself replaces the missing one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Nearby {
     before: Plane<f64>,
@@ -132,7 +132,7 @@ pub(crate) fn influence<const N: usize>(
                 - gravity(&model.chain, &pose)
         }
         Imperfection::HandlePlacement(axis) => {
-            // A displaced handle lengthens the lever of the last segment; every joint feels the same moment.
+            // A displaced handle lengthens the lever of the last segment; the moment acts alike on every joint.
             let angle = motion.q[i].iter().fold(0.0, |sum, q| sum + q);
             let (s, c) = Scalar::sin_cos(angle);
             let direction = if axis == 0 { [c, s] } else { [-s, c] };

@@ -162,7 +162,7 @@ fn sticking<const N: usize>(model: &Model<N>) -> [bool; N] {
     core::array::from_fn(|j| model.fitted.iter().chain(&model.held).any(dry(j)))
 }
 
-/// The fitted effects as their columns see them: where amplitude · rest is an unknown, the amplitude acts about zero.
+/// The fitted effects in the form of their columns: where amplitude · rest is an unknown, the amplitude acts about zero.
 fn regressed<const N: usize>(model: &Model<N>, unknowns: &[Unknown]) -> Vec<Effect<f64>> {
     let mut effects = model.fitted.clone();
     for unknown in unknowns {

@@ -140,7 +140,7 @@ fn channel<const N: usize>(rows: &[Joints<f64, N>], joint: usize) -> Vec<f64> {
 
 /// Standard deviation of the speed that measurement noise leaves below a cutoff, for each joint \[rad/s\].
 ///
-/// The variance σ² of the noise is read off third differences, where motion vanishes and white noise has 20 σ². An ideal
+/// The variance σ² of the noise is estimated from third differences, where motion vanishes and white noise has 20 σ². An ideal
 /// low-pass of a measured speed leaves the share `2 f_c/f_s` of it; of an angle, the speed has the variance
 /// `σ² (2/f_s) (2π)² f_c³/3`.
 ///
@@ -190,7 +190,7 @@ pub fn relative_speed_noise<const N: usize>(
     }))
 }
 
-/// Noise of a speed above this share of the speed biases what is read from speeds, by more than any interval shows.
+/// Noise of a speed above this share of the speed biases estimates from speeds by more than their intervals.
 pub const QUIET: f64 = 0.05;
 /// Lowest cutoff that is chosen by itself because of noise \[Hz\].
 const LOWEST_CUTOFF: f64 = 0.5;
@@ -201,7 +201,7 @@ const SPACING: f64 = 1.5;
 
 /// Cutoff frequencies to choose from \[Hz\]: from the thesis' own 5 Hz upwards by half, to a quarter of the lowest sampling rate.
 ///
-/// A low cutoff bends fast motion (the filter does not commute with products of angles), a high one lets noise in.
+/// A low cutoff distorts fast motion (the filter does not commute with products of angles), a high one passes noise.
 pub fn candidates<const N: usize>(trials: &[&Trial<N>]) -> Vec<f64> {
     let rate = trials.iter().map(|t| t.rate).fold(f64::INFINITY, f64::min);
     let mut list = vec![LEAST_CUTOFF.min(rate / 4.0)];
@@ -230,7 +230,7 @@ pub fn candidates_of_measured<const N: usize>(
     Ok(list)
 }
 
-/// Whether what is read from speeds with this relative noise can be trusted, see [`QUIET`].
+/// Whether estimates from speeds with this relative noise have a negligible bias, see [`QUIET`].
 pub fn is_quiet(relative_noise: &[f64]) -> bool {
     relative_noise.iter().all(|&share| share <= QUIET)
 }
@@ -240,7 +240,7 @@ const DEAD_BAND: f64 = 3.0;
 
 /// Slowest speed that counts as motion \[rad/s\], with this noise of the speed.
 pub(crate) fn slowest(noise: f64) -> f64 {
-    /// However little noise there is.
+    /// At any noise.
     const LEAST: f64 = 1e-4;
     f64::max(DEAD_BAND * noise, LEAST)
 }

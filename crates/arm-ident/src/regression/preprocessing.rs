@@ -12,18 +12,18 @@ use arm_numerics::error::check_least;
 use arm_numerics::signal::filter::{BothWays, Butterworth};
 use arm_numerics::statistics::autoregressive::effective_samples;
 
-/// Samples kept for each period of the cutoff frequency; a little above the two that the sampling theorem asks for.
+/// Samples kept for each period of the cutoff frequency; a little above the two of the sampling theorem.
 const SAMPLES_PER_PERIOD: f64 = 2.5;
 
-/// Periods of the cutoff frequency that are dropped next to an end or a gap, where filters and differences have guessed.
+/// Periods of the cutoff frequency that are dropped next to an end or a gap, where filters and differences extrapolate.
 const MARGIN: f64 = 1.5;
 
 /// Fewest decimated samples in a stretch that is used.
 const SHORTEST: usize = 8;
 
-/// Fewest samples that are built and filtered at once: what is shorter goes through in one.
+/// Fewest samples that are built and filtered at once; a shorter trial is filtered as a whole.
 const STRETCH: usize = 4096;
-/// The same in lengths of what a filter rings on, which is filtered twice.
+/// The same in lengths of the filter's decay, part of which is filtered twice.
 const REACHES: usize = 4;
 
 /// Rows after filtering and decimation, in pieces without a gap.
@@ -142,13 +142,13 @@ pub fn with_rest_columns(mut pieces: Pieces, unknowns: usize) -> Pieces {
     pieces
 }
 
-/// Low-passes all columns and the right-hand side of a trial alike, keeps one sample in some, and drops what a gap or an end has touched.
+/// Low-passes all columns and the right-hand side of a trial alike, decimates, and drops samples near a gap or an end.
 ///
-/// Rows are asked for a stretch at a time, so that those of the whole trial are never held.
+/// Rows are built one stretch at a time, so that those of the whole trial are never held in memory.
 ///
 /// * `cutoff` - of the low-pass \[Hz\]
 /// * `unknowns` - number of columns
-/// * `build` - gives the rows of the next samples, as many as it is asked for
+/// * `build` - gives the rows of the next samples, as many as requested
 ///
 /// # Errors
 /// [`IdentError`] for a trial too short for the filter.
@@ -208,10 +208,10 @@ fn kept_samples(valid: &[bool], margin: usize, step: usize) -> Vec<Vec<usize>> {
 
 /// How much the rows weigh: the inverse Cholesky factor of the covariance of one sample's torques.
 ///
-/// Where a movement was repeated, the covariance is that of the scatter between repeats, which is noise and nothing else;
+/// Where a movement was repeated, the covariance is that of the scatter between repeats, which is noise alone;
 /// then joints that the same force noise disturbs are weighed together. Without repeats only one variance a joint is
-/// taken from the residual: what a model lacks is in it too, and must not steer the estimate through the weights.
-/// That rows are not independent in time is left to the clustered covariance; here it only lowers the weight against the
+/// taken from the residual: the lack of fit is in it too, and must not affect the estimate through cross-weights.
+/// The correlation of rows in time is treated by the clustered covariance; here it only lowers the weight against the
 /// prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise<const N: usize> {
@@ -219,7 +219,7 @@ pub struct Noise<const N: usize> {
     inverse: [[f64; N]; N],
 }
 
-/// Share of the largest variance that is added to every joint, so that no combination of torques is trusted beyond the model.
+/// Share of the largest variance that is added to every joint, so that no combination of torques is weighted beyond the accuracy of the model.
 pub(crate) const LEAST_SHARE: f64 = 1e-3;
 
 impl<const N: usize> Noise<N> {
@@ -304,8 +304,8 @@ impl<const N: usize> Noise<N> {
         Self { inverse }
     }
 
-    /// The same weights, lowered until the residuals are no larger than the noise: what repeats do not show but the
-    /// model cannot explain limits how far data may overrule what is known beforehand.
+    /// The same weights, lowered until the residuals are no larger than the noise: a lack of fit that the scatter of
+    /// repeats does not contain limits the weight of the data against the prior.
     pub fn at_least(mut self, residuals: &[Vec<f64>]) -> Self {
         let (mut sum, mut count) = (0.0, 0.0);
         for sample in residuals.iter().flat_map(|p| p.chunks_exact(N)) {

@@ -1,4 +1,4 @@
-//! What a trial brings: uniformly sampled channels, already in SI units and with the force named by what it acts on.
+//! A trial: uniformly sampled channels in SI units, with the force named by the body that it acts on.
 
 use arm_core::effect::{Effect, Motion};
 use arm_core::{Chain, Contact, Joints, Plane};
@@ -34,7 +34,7 @@ pub struct Trial<const N: usize> {
     pub torque: Option<Vec<Joints<f64, N>>>,
     /// Position of the robot's handle \[m\], where the robot's angles are known.
     pub handle: Option<Vec<Plane<f64>>>,
-    /// Position of the first joint \[m\], where its path was measured; else it rests where the model says.
+    /// Position of the first joint \[m\], where its path was measured; else it rests at the position in the model.
     pub base: Option<Vec<Plane<f64>>>,
     /// Activity of the muscles that move each joint, where it was measured, see [`Motion::activity`]; else the arm is at rest.
     pub activity: Option<Vec<[f64; N]>>,
@@ -71,7 +71,7 @@ impl<const N: usize> Trial<N> {
         self.q.is_empty()
     }
 
-    /// An arm that moves at a sample, as effects see it; without accelerations and joint forces.
+    /// Motion of the arm at a sample, the input of effects; without accelerations and joint forces.
     pub fn motion(&self, i: usize, q: &Joints<f64, N>, qd: &Joints<f64, N>) -> Motion<f64, N> {
         let mut motion = Motion::new(i as f64 / self.rate, *q, *qd);
         if let Some(activity) = &self.activity {
@@ -93,7 +93,7 @@ impl<const N: usize> Trial<N> {
     }
 }
 
-/// The model that the data challenge.
+/// The model that is fitted.
 #[derive(Clone, Debug)]
 pub struct Model<const N: usize> {
     /// The rigid arm.

@@ -1,4 +1,4 @@
-//! The unknowns of an identification and what is known of each beforehand.
+//! The unknowns of an identification and their priors.
 
 use arm_core::effect::{Effect, Place};
 
@@ -37,7 +37,7 @@ pub enum Imperfection {
     NeglectedInertia,
 }
 
-/// What a column of the regression stands for.
+/// The quantity of a column of the regression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// An inertial parameter of a segment.
@@ -53,7 +53,7 @@ pub enum Source {
 /// One unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknown {
-    /// What it stands for.
+    /// The quantity.
     pub source: Source,
     /// Name as in files: of an effect's parameter without effect and joint.
     pub name: String,
@@ -63,7 +63,7 @@ pub struct Unknown {
     pub joint: Option<usize>,
     /// SI unit.
     pub unit: &'static str,
-    /// Value expected beforehand.
+    /// Prior mean.
     pub mean: f64,
     /// Its standard deviation; infinite where nothing is known.
     pub sd: f64,

@@ -121,7 +121,7 @@ fn friction_of_a_joint_that_never_moves_is_not_identified() {
     assert!(rested.std > 10.0);
     let said = "coulomb2 torque does not act on the data".to_owned();
     assert!(result.trades.contains(&said), "{:?}", result.trades);
-    // Its own rows tell nothing of what it carries either.
+    // Its own rows do not determine what it carries either.
     assert_eq!(named(&result, "m2*l2").decided_by, Decision::Prior);
 }
 

@@ -148,7 +148,7 @@ fn forces_at_the_tip_tell_as_much_as_torques() {
     assert!(rms(&result, 0) < 1e-3);
 }
 
-/// Slow and noisy, so that nothing is said of the moments of inertia but by chance.
+/// Slow and noisy, so that the moments of inertia are determined by chance only.
 fn slow_and_noisy(truth: &Chain<f64, 3>, sd: f64, seed: u64) -> Trial<3> {
     let mut recipe = Recipe::new(*truth);
     recipe.rate = 100.0;
@@ -241,7 +241,7 @@ fn a_static_movement_tells_first_moments_and_no_mass() {
     recipe.quasi_static = true;
     recipe.rate = 100.0;
     recipe.duration = 60.0;
-    // The speed of the measured angles is real though the torques know nothing of it: turn it off by moving slowly.
+    // The speed of the measured angles is real although the torques do not depend on it: a slow movement makes it negligible.
     let path = static_path([-0.6, 0.9, 0.2]);
     let slower = move |t: f64| -> State<3> { path(t * 0.05) };
     recipe.duration = 600.0;
@@ -312,7 +312,7 @@ fn without_load_ratios_are_found_and_the_scale_is_the_models() {
     let given = moments(&model.chain);
     let mean: f64 = found.iter().zip(&given).map(|(f, g)| f / g).sum::<f64>() / 4.0;
     assert!((mean - 1.0).abs() < 1e-6, "{mean}");
-    // One direction of the rank is the scale itself, which no data tell.
+    // One direction of the rank is the scale itself, which no data determine.
     let loaded = identify(
         &model,
         &[Recipe::new(truth).torque_trial(&sines([-0.6, 1.2], 0.3, 1.0), &[])],

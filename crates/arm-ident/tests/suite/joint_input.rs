@@ -62,7 +62,7 @@ fn test_trials_change_no_bit_of_the_estimate() {
         ..Options::default()
     };
     let alone = identify(&model, std::slice::from_ref(&fit), &options).expect("a solution");
-    // Another movement, another arm, noise, no force: nothing of it may be felt.
+    // Another movement, another arm, noise, no force: none of it may have an effect.
     let mut test = Recipe {
         force: None,
         ..recipe

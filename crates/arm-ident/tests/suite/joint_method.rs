@@ -1,4 +1,4 @@
-//! What the tests of the joint method share: how they ask, and how they read the answer.
+//! Shared by the tests of the joint method: input, and access to results.
 
 use arm_core::{Chain, Segment, models};
 use arm_ident::inference::estimate::{Estimate, Identified};
@@ -54,6 +54,8 @@ pub fn two_factors() -> [[f64; 3]; 2] {
 }
 
 pub fn rms<const N: usize>(result: &Identified<N>, trial: usize) -> f64 {
-    let (sum, n) = result.explained[trial].square_sum();
-    (sum.iter().sum::<f64>() / (n * N) as f64).sqrt()
+    let explained = &result.explained[trial];
+    let pairs = explained.measured.iter().zip(&explained.fitted);
+    let sum: f64 = pairs.map(|(m, f)| (m - f).norm_squared()).sum();
+    (sum / (explained.measured.len() * N) as f64).sqrt()
 }

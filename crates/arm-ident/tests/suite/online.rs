@@ -1,4 +1,4 @@
-//! The estimator that learns while the arm moves, against the batch method on the same movement.
+//! The online estimator against the batch method on the same movement.
 
 use std::path::PathBuf;
 
@@ -173,7 +173,7 @@ fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
     (model, trial, Some(lead))
 }
 
-/// What the estimator is told of that rig: 0.02 N m is what is left of a window once the arm is known.
+/// Settings of the estimator for that rig: 0.02 N m is what is left of a window once the arm is known.
 fn settings<T: Real>(chain: &Chain<f64, 2>, period: f64) -> Settings<T, 2> {
     let mut settings = Settings::new(&chain.cast(), T::of(period));
     settings.noise = [T::of(0.02); 2];

@@ -33,7 +33,7 @@ fn raw(samples: usize) -> (Rows, Trial<2>) {
     (rows, trial)
 }
 
-/// Gives the next rows of `all` whenever it is asked.
+/// Gives the next rows of `all` at each call.
 fn part_by_part(all: &Rows) -> impl FnMut(usize) -> Rows + '_ {
     let mut built = 0;
     move |count| {

@@ -211,7 +211,7 @@ fn the_same_model_with_one_parameter_changed() {
         let others = model.parameters();
         for other in others.iter().filter(|p| p.id != id(text)) {
             let after = changed.value(other.id);
-            // A viscosity of zero is no effect, and its key still says so.
+            // A viscosity of zero is no effect, and its key is still stated.
             assert_eq!(after, Some(other.value), "{} after {text}", other.id);
         }
         let again = Model::from_toml(&changed.to_toml()).unwrap();
@@ -315,7 +315,7 @@ fn laws_of_joints_are_effects_like_any_other() {
     );
 }
 
-/// What a `[[joint]]` states is what the catalogue says every passive joint has.
+/// A `[[joint]]` states the laws that every passive joint has by the catalogue.
 #[test]
 fn joints_state_the_laws_of_every_passive_joint() {
     let stated: Vec<_> = joint_laws()

@@ -64,11 +64,6 @@ impl Condenser {
         }
     }
 
-    /// Number of parameters `p`.
-    pub fn parameters(&self) -> usize {
-        self.p
-    }
-
     /// Number of rows pushed so far.
     pub fn rows(&self) -> usize {
         self.rows
@@ -154,31 +149,7 @@ impl Condenser {
         Ok(true)
     }
 
-    /// Adds all rows of another condenser, after those pushed here. The result depends on the order of merging in its last bits: merge in a fixed order.
-    ///
-    /// # Errors
-    /// [`NumericsError::Length`] if `other` has another number of parameters.
-    pub fn merge(&mut self, other: &Condenser) -> Result<(), NumericsError> {
-        check_len("other", other.p, self.p)?;
-        let rows = self.rows + other.rows;
-        let width = self.p + 1;
-        for k in 0..width {
-            self.push_with(|j| {
-                if j < k {
-                    0.0
-                } else {
-                    other.triangle[k * width + j]
-                }
-            });
-        }
-        for i in 0..other.waiting {
-            self.push_with(|j| other.panel[j][i]);
-        }
-        self.rows = rows;
-        Ok(())
-    }
-
-    /// Adds the problem that a factor stands for, its residual included.
+    /// Adds the problem of a factor, its residual included.
     ///
     /// # Errors
     /// [`NumericsError::Length`] if `factor` has another number of parameters; [`NumericsError::NotFinite`].

@@ -1,4 +1,4 @@
-//! The triangular factor of a least-squares problem: everything the data say, in `p(p+3)/2 + 1` numbers.
+//! The triangular factor of a least-squares problem: sufficient statistics of the data, `p(p+3)/2 + 1` numbers.
 
 use crate::error::{NumericsError, check_finite, check_len};
 use crate::linalg::matrix::{Matrix, dot};
@@ -63,19 +63,6 @@ impl Factor {
     pub fn score(&self, x: &[f64]) -> Result<Vec<f64>, NumericsError> {
         let e = self.misfit(x)?;
         Ok(self.r.transpose_times(&e))
-    }
-
-    /// The same problem in `x̃` with `x = S x̃`.
-    ///
-    /// # Errors
-    /// [`NumericsError::Length`], [`NumericsError::NotFinite`].
-    pub fn scaled(&self, scale: &[f64]) -> Result<Self, NumericsError> {
-        check_len("scale", scale.len(), self.parameters())?;
-        check_finite("scale", scale)?;
-        Ok(Self {
-            r: self.r.scaled_columns(scale),
-            ..self.clone()
-        })
     }
 
     /// Refuses a factor whose public fields do not fit together.

@@ -9,7 +9,7 @@ pub enum Status {
     AlmostSolved,
     /// No `x` satisfies all constraints. `x` is NaN.
     Infeasible,
-    /// No usable answer. `x` is NaN.
+    /// No usable solution. `x` is NaN.
     Failed(Reason),
 }
 
@@ -45,7 +45,7 @@ pub enum Reason {
     Other,
 }
 
-/// How an answer was found.
+/// How a solution was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Route {
     /// Least squares under the equalities already satisfied everything else.
@@ -65,7 +65,7 @@ pub struct Outcome {
     pub route: Route,
     /// The estimate, in the caller's units; NaN if there is none.
     pub x: Vec<f64>,
-    /// Per parameter: −1 at its lower bound, +1 at its upper bound, 0 between. Where both coincide the sign says to which side the data pull.
+    /// Per parameter: −1 at its lower bound, +1 at its upper bound, 0 between. Where both coincide the sign is the side of the unconstrained minimum.
     pub active: Vec<i8>,
     /// Per linear inequality: whether it holds with equality.
     pub binding_inequalities: Vec<bool>,

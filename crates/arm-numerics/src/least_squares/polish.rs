@@ -22,7 +22,7 @@ const FEASIBLE: f64 = 1e-10;
 /// A multiplier may be this negative, relative to the size of the gradient's terms, and count as zero.
 const ZERO_MULTIPLIER: f64 = 1e-10;
 
-/// Refines `start`. `None` if no set of binding constraints near the guess gives a feasible point with multipliers of the right sign.
+/// Refines `start`. `None` if no set of binding constraints near it gives a feasible point with multipliers of the right sign.
 pub(crate) fn polish(scaled: &Scaled, start: &[f64], guess: &Active) -> Option<(Vec<f64>, Active)> {
     let mut active = guess.clone();
     let largest = norm(scaled.r.as_slice());

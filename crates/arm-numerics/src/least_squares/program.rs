@@ -18,7 +18,7 @@ pub struct Cone {
     pub d: f64,
 }
 
-/// A convex least-squares problem, built step by step and solved as often as wanted.
+/// A convex least-squares problem, built step by step; it can be solved repeatedly.
 ///
 /// ```
 /// use arm_numerics::Matrix;
@@ -75,7 +75,7 @@ impl Program {
         })
     }
 
-    /// The problem that a factor stands for.
+    /// The problem of a factor.
     ///
     /// # Errors
     /// As [`Program::new`].

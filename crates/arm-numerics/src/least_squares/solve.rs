@@ -2,7 +2,7 @@
 //!
 //! The way of a solution:
 //! 1. Everything is rewritten in `x̃`, `x = S x̃`, and divided by the largest element of `|R S|`.
-//! 2. Least squares under the equalities alone. If it satisfies the rest, it is the answer and no interior-point solver runs.
+//! 2. Least squares under the equalities alone. If it satisfies the rest, it is the solution and no interior-point solver runs.
 //! 3. clarabel: with `P = RᵀR` while `cond(R S) ≤ 1e6`, else as `min t, ‖R x̃ − z‖ ≤ t`, which does not square the condition number.
 //! 4. Constraints with next to no slack are made equalities and the least-squares problem is solved again ([`Route::Polished`]). The result is
 //!    taken only if it is feasible and every multiplier has the right sign: then it is the optimum to rounding, and a parameter on its bound *equals* it.
@@ -23,7 +23,7 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 /// Condition number of `R S` above which the epigraph form is used.
 pub const EPIGRAPH_ABOVE: f64 = 1e6;
 
-/// Relative tolerances asked of the interior-point solver.
+/// Relative tolerances of the interior-point solver.
 const INTERIOR_TOLERANCE: f64 = 1e-9;
 
 /// A constraint of unit gradient with less slack than this (relative to 1 and its value) is first taken as binding.

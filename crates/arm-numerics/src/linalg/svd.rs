@@ -2,7 +2,6 @@
 //!
 //! Short, accurate for small singular values, and the same bits everywhere (Demmel & Veselić 1992; Golub & Van Loan, *Matrix Computations*, 8.6.3).
 
-use crate::error::{NumericsError, check_finite};
 use crate::linalg::matrix::{Matrix, dot, norm};
 
 /// Sweeps after which rotation stops; six to ten are usual.
@@ -20,16 +19,7 @@ pub struct Svd {
 }
 
 impl Svd {
-    /// Decomposes `a`.
-    ///
-    /// # Errors
-    /// [`NumericsError::NotFinite`].
-    pub fn new(a: &Matrix) -> Result<Self, NumericsError> {
-        check_finite("a", a.as_slice())?;
-        Ok(Self::of(a.clone()))
-    }
-
-    /// Of a matrix that is known to be finite.
+    /// Decomposes a finite matrix.
     pub fn of(mut a: Matrix) -> Self {
         let n = a.cols();
         // Powers of two only, so that scaling does not round.

@@ -4,7 +4,7 @@ use crate::error::{NumericsError, check_finite, check_least, check_len, check_ra
 use arm_core::simd_dispatch::{Computation, dispatch};
 use std::f64::consts::PI;
 
-/// Highest order; beyond it no measurement asks for a steeper edge.
+/// Highest order; no measurement needs a steeper edge.
 const HIGHEST_ORDER: usize = 20;
 
 /// One second-order section `(b₀ + b₁z⁻¹ + b₂z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²)` with unit gain at rest.
@@ -17,14 +17,13 @@ struct Section {
 /// A Butterworth low-pass filter as second-order sections (bilinear transform with pre-warping), for columns sampled at a fixed rate.
 ///
 /// The cutoff is that of a **single pass**: −3.01 dB there. [`Butterworth::both_ways`] passes twice, so it has −6.02 dB at the same frequency and −3.01 dB at
-/// [`Butterworth::half_power_both_ways_hz`], which is lower. Whoever means "−3 dB of the zero-phase filter" starts with [`Butterworth::for_both_ways`].
+/// a lower one. For −3.01 dB of the zero-phase filter, use [`Butterworth::for_both_ways`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Butterworth {
     sections: Vec<Section>,
     order: usize,
     /// `tan(π f_c / f_s)`
     warped: f64,
-    rate_hz: f64,
 }
 
 impl Butterworth {
@@ -40,11 +39,7 @@ impl Butterworth {
             cutoff_hz / rate_hz,
             [1e-7, 0.499_999],
         )?;
-        Ok(Self::of_warped(
-            order,
-            libm::tan(PI * cutoff_hz / rate_hz),
-            rate_hz,
-        ))
+        Ok(Self::of_warped(order, libm::tan(PI * cutoff_hz / rate_hz)))
     }
 
     /// A filter that has −3.01 dB at `half_power_hz` after both passes of [`Butterworth::both_ways`].
@@ -59,14 +54,12 @@ impl Butterworth {
         rate_hz: f64,
     ) -> Result<Self, NumericsError> {
         let plain = Self::low_pass(order, half_power_hz, rate_hz)?;
-        Ok(Self::of_warped(
-            order,
-            plain.warped / two_pass_factor(order),
-            rate_hz,
-        ))
+        // Where two passes lose 3 dB, in units of the (warped) cutoff.
+        let two_pass_factor = libm::pow(2.0_f64.sqrt() - 1.0, 0.5 / order as f64);
+        Ok(Self::of_warped(order, plain.warped / two_pass_factor))
     }
 
-    fn of_warped(order: usize, k: f64, rate_hz: f64) -> Self {
+    fn of_warped(order: usize, k: f64) -> Self {
         let mut sections = Vec::with_capacity(order.div_ceil(2));
         if order % 2 == 1 {
             let b = k / (1.0 + k);
@@ -93,40 +86,12 @@ impl Butterworth {
             sections,
             order,
             warped: k,
-            rate_hz,
         }
-    }
-
-    /// Frequency of −3.01 dB in a single pass \[Hz\].
-    pub fn cutoff_hz(&self) -> f64 {
-        libm::atan(self.warped) * self.rate_hz / PI
-    }
-
-    /// Frequency of −3.01 dB after both passes \[Hz\]; at [`Butterworth::cutoff_hz`] it is −6.02 dB.
-    pub fn half_power_both_ways_hz(&self) -> f64 {
-        libm::atan(self.warped * two_pass_factor(self.order)) * self.rate_hz / PI
-    }
-
-    /// Gain of a single pass at a frequency below half the rate; both passes have its square.
-    pub fn gain(&self, frequency_hz: f64) -> f64 {
-        let ratio = libm::tan(PI * frequency_hz / self.rate_hz) / self.warped;
-        1.0 / (1.0 + libm::pow(ratio * ratio, self.order as f64)).sqrt()
     }
 
     /// Samples that [`Butterworth::both_ways`] adds at each end; a column must be longer.
     pub fn padding(&self) -> usize {
         3 * (2 * self.sections.len() + 1 - self.order % 2)
-    }
-
-    /// One causal pass, as a sensor's filter would do; starts at rest on the first value.
-    ///
-    /// # Errors
-    /// [`NumericsError::NotFinite`].
-    pub fn once(&self, column: &[f64]) -> Result<Vec<f64>, NumericsError> {
-        check_finite("column", column)?;
-        let mut out = column.to_vec();
-        self.pass(&mut out);
-        Ok(out)
     }
 
     /// Forward and backward, without phase. Equals `scipy.signal.sosfiltfilt` with its defaults: odd reflection of [`Butterworth::padding`] samples at both
@@ -410,9 +375,4 @@ impl Group {
         }
         filter.pass_abreast(&mut self.state, &mut self.ahead[known..]);
     }
-}
-
-/// `(√2 − 1)^(1/2n)`: where two passes lose 3 dB, in units of the (warped) cutoff.
-fn two_pass_factor(order: usize) -> f64 {
-    libm::pow(2.0_f64.sqrt() - 1.0, 0.5 / order as f64)
 }

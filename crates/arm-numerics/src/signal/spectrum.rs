@@ -1,14 +1,14 @@
-//! Lines in the spectrum of what is left: frequencies at which residuals swing in every trial.
+//! Lines in the spectrum of residuals: frequencies at which they oscillate in every trial.
 
 use core::f64::consts::TAU;
 
 use crate::statistics::distributions::chi_square_tail;
 
-/// Highest frequency at which a line is looked for \[Hz\]: no muscle and no led arm swings faster.
+/// Highest frequency of the search for a line \[Hz\]: no muscle and no led arm oscillates faster.
 const HIGHEST: f64 = 15.0;
-/// Probability by chance below which a line is one, over all frequencies and channels.
+/// Significance level of a line, over all frequencies and channels.
 const CHANCE: f64 = 1e-6;
-/// How far around a frequency its neighbourhood reaches, and where it starts \[Hz\].
+/// Distances at which the neighbourhood of a frequency starts and ends \[Hz\].
 const AROUND: (f64, f64) = (0.3, 1.5);
 
 /// One Fourier coefficient of a column, tapered by a Hann window.
@@ -16,7 +16,7 @@ pub fn coefficient(column: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
     swing(&tapered(column), frequency, rate)
 }
 
-/// A column without its mean under a Hann window, scaled so that the coefficient of a swing is its size.
+/// A column without its mean under a Hann window, scaled so that the coefficient of an oscillation is its amplitude.
 fn tapered(column: &[f64]) -> Vec<f64> {
     let n = column.len() as f64;
     let mean = column.iter().sum::<f64>() / n;
@@ -29,7 +29,7 @@ fn tapered(column: &[f64]) -> Vec<f64> {
 
 /// One Fourier coefficient of a tapered column.
 fn swing(tapered: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
-    /// Samples over which a phase is turned on before it is computed anew: so many roundings add up.
+    /// Samples over which a phase is advanced by rotation before it is computed anew, which limits the rounding error.
     const SAMPLES_PER_SINCOS: usize = 32;
     let (sin, cos) = libm::sincos(TAU * frequency / rate);
     let mut sum = [0.0; 2];
@@ -45,12 +45,12 @@ fn swing(tapered: &[f64], frequency: f64, rate: f64) -> [f64; 2] {
     sum
 }
 
-/// How swings of several trials are put together.
+/// How oscillations of several trials are combined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sum {
     /// By their power: each may have a phase of its own.
     Powers,
-    /// As they are: what has the same phase in every trial stands out, and noise and what movements do not share averages out.
+    /// As they are: oscillations with the same phase in every trial add up; noise and the rest average out.
     Swings,
 }
 
@@ -78,10 +78,10 @@ impl Sum {
     }
 }
 
-/// The strongest line: its frequency \[Hz\]; `None` when nothing stands out.
+/// The strongest line: its frequency \[Hz\]; `None` when no line is significant.
 ///
 /// * `trials` - channels of every trial, all at the same rate
-/// * `lowest` - frequency at which it begins to look \[Hz\]: below it movements have power of their own
+/// * `lowest` - lowest frequency of the search \[Hz\]: below it movements have power of their own
 ///
 /// Each channel's power over trials is compared with the upper quartile of its neighbourhood.
 pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Option<f64> {
@@ -109,14 +109,14 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Opti
                 })
                 .map(|o| power[o])
                 .collect();
-            // Both sides must be there, or a slope would look like a line.
+            // Both sides must be there, or a slope would be taken for a line.
             let both = frequency(k) - AROUND.0 > lowest && frequency(k) + AROUND.0 < highest;
             if around.len() < 8 || !both {
                 continue;
             }
             let mut sorted = around;
             sorted.sort_by(f64::total_cmp);
-            // The larger of the quartiles above: red noise rises to one side.
+            // The upper quartile: red noise rises to one side.
             let level = sorted[sorted.len() * 3 / 4];
             let ratio = power[k] / level.max(f64::MIN_POSITIVE);
             let dof = sum.freedom(trials.len());

@@ -1,21 +1,10 @@
-//! Residuals that are not white: autocovariance, effective number of samples, autoregressive models and whitening.
+//! Residuals that are not white: effective number of samples, autoregressive models and whitening.
 //!
 //! A series is one uninterrupted trial. Several trials are given side by side and never joined: no lag crosses their ends.
 
 use crate::error::{NumericsError, check_finite, check_least, check_range};
 use crate::linalg::matrix::{Matrix, dot};
 use crate::linalg::orthogonal::{Qr, solve_upper};
-
-/// `γ_k = (1/n) Σ_t (x_t − x̄)(x_{t+k} − x̄)` for `k = 0 … lags`.
-///
-/// # Errors
-/// [`NumericsError::TooFew`] unless there are more samples than lags, [`NumericsError::NotFinite`].
-pub fn autocovariance(series: &[f64], lags: usize) -> Result<Vec<f64>, NumericsError> {
-    check_least("samples of series", series.len(), lags + 1)?;
-    check_finite("series", series)?;
-    let x = centred(series);
-    Ok((0..=lags).map(|k| lagged(&x, k) / x.len() as f64).collect())
-}
 
 /// How many independent samples would fix the mean of this series as well as its `n` correlated ones: `n / (1 + 2 Σ ρ_k)`, between 1 and `n`.
 ///
@@ -53,75 +42,24 @@ pub struct AutoRegression {
 }
 
 impl AutoRegression {
-    /// Fit by the Yule–Walker equations (Levinson–Durbin) to the pooled autocovariance of several trials. Always stationary; biased towards zero on short series.
+    /// The order `0 … most` with the smallest corrected Akaike criterion, fitted by Burg's method to several trials whose mean is known to be zero.
+    /// The model is always stationary. Subtracting an estimated mean from short series would remove slow noise.
+    ///
+    /// Other fitted quantities that were subtracted have removed noise, too. Its expected power is added to every product, but
+    /// not to the number of samples: the expectation step of restricted maximum likelihood (Dempster, Laird and Rubin 1977).
+    ///
+    /// * `taken` - series whose products add up to the posterior covariance of what was subtracted
     ///
     /// # Errors
-    /// [`NumericsError::TooFew`] unless some series is longer than `order` and not constant, [`NumericsError::NotFinite`].
-    pub fn yule_walker(series: &[&[f64]], order: usize) -> Result<Self, NumericsError> {
-        let centred = prepared(series, order)?;
-        let total: usize = centred.iter().map(Vec::len).sum();
-        let gamma: Vec<f64> = (0..=order)
-            .map(|k| centred.iter().fold(0.0, |sum, x| sum + lagged(x, k)) / total as f64)
-            .collect();
-        let mut a: Vec<f64> = Vec::with_capacity(order);
-        let mut variance = gamma[0];
-        for m in 1..=order {
-            let k = if variance > 0.0 {
-                (gamma[m]
-                    - a.iter()
-                        .enumerate()
-                        .fold(0.0, |s, (i, a)| s + a * gamma[m - 1 - i]))
-                    / variance
-            } else {
-                0.0
-            };
-            extend(&mut a, k);
-            variance *= 1.0 - k * k;
-        }
-        Ok(Self {
-            coefficients: a,
-            sd: variance.max(0.0).sqrt(),
-        })
-    }
-
-    /// Fit by Burg's method, pooled over trials: least forward and backward prediction error, always stationary, less biased than Yule–Walker.
-    ///
-    /// # Errors
-    /// As [`AutoRegression::yule_walker`].
-    pub fn burg(series: &[&[f64]], order: usize) -> Result<Self, NumericsError> {
-        let path = burg_path(prepared(series, order)?, order, samples(series));
-        Ok(path.last().cloned().unwrap_or(Self {
-            coefficients: Vec::new(),
-            sd: 0.0,
-        }))
-    }
-
-    /// The order `0 … most` with the smallest corrected Akaike criterion, fitted by Burg's method.
-    ///
-    /// # Errors
-    /// As [`AutoRegression::yule_walker`], with `most` for the order.
-    pub fn selected(series: &[&[f64]], most: usize) -> Result<Self, NumericsError> {
-        let n = samples(series);
-        Ok(Self::best(burg_path(prepared(series, most)?, most, n), n))
-    }
-
-    /// The same for series whose mean is known to be zero. A mean that is taken out of short series takes slow noise with it.
-    ///
-    /// Whatever else was fitted and taken out takes some as well. What of it may have been noise counts in every product, and
-    /// not in the number of samples: the expectation step of restricted maximum likelihood (Dempster, Laird and Rubin 1977).
-    ///
-    /// * `taken` - series whose products add up to the covariance of what was taken out, as far as it is not known
-    ///
-    /// # Errors
-    /// As [`AutoRegression::selected`].
+    /// [`NumericsError::TooFew`] unless some series is longer than `most` and not constant, [`NumericsError::NotFinite`].
     pub fn selected_about_zero(
         series: &[&[f64]],
         taken: &[&[f64]],
         most: usize,
     ) -> Result<Self, NumericsError> {
-        prepared(series, most)?;
+        check(series, most)?;
         let all = series.iter().chain(taken).map(|s| s.to_vec()).collect();
-        let n = samples(series);
+        let n = series.iter().map(|s| s.len()).sum();
         Ok(Self::best(burg_path(all, most, n), n))
     }
 
@@ -145,19 +83,9 @@ impl AutoRegression {
             }
         })
     }
-
-    /// Variance of the mean of many samples times their number: `sd² / (1 − Σ a)²`.
-    pub fn long_run_variance(&self) -> f64 {
-        let rest = 1.0 - self.coefficients.iter().sum::<f64>();
-        (self.sd / rest) * (self.sd / rest)
-    }
 }
 
-fn samples(series: &[&[f64]]) -> usize {
-    series.iter().map(|s| s.len()).sum()
-}
-
-/// Burg's models of order 0, 1, … `order` of series that stand for a number of samples.
+/// Burg's models of order 0, 1, … `order` of series; power is divided by a number of samples.
 fn burg_path(mut forward: Vec<Vec<f64>>, order: usize, samples: usize) -> Vec<AutoRegression> {
     let mut backward = forward.clone();
     let mut variance = forward.iter().fold(0.0, |sum, x| sum + dot(x, x)) / samples as f64;
@@ -237,11 +165,6 @@ impl Whitener {
         Ok(Self { predictors })
     }
 
-    /// Whitens one column of one trial in place.
-    pub fn apply(&self, column: &mut [f64]) {
-        whiten(column, |t| self.next(t));
-    }
-
     /// The order of the model.
     pub fn order(&self) -> usize {
         self.predictors.len() - 1
@@ -296,40 +219,21 @@ impl Whitener {
     }
 }
 
-/// Subtracts from each sample what is predicted of it, and scales the rest.
-fn whiten<'a>(column: &mut [f64], predictor: impl Fn(usize) -> &'a Predictor) {
-    // Backwards, so that every sample still finds its unfiltered past.
-    for t in (0..column.len()).rev() {
-        let (a, inverse) = predictor(t);
-        let past = a.iter().enumerate();
-        let predicted = past.fold(0.0, |sum, (i, a)| sum + a * column[t - 1 - i]);
-        column[t] = (column[t] - predicted) * inverse;
-    }
-}
-
 /// Levinson's step: from order m − 1 to m by the partial correlation `k`.
 fn extend(a: &mut Vec<f64>, k: f64) {
     let m = a.len();
     *a = (0..m).map(|i| a[i] - k * a[m - 1 - i]).chain([k]).collect();
 }
 
-fn prepared(series: &[&[f64]], order: usize) -> Result<Vec<Vec<f64>>, NumericsError> {
+fn check(series: &[&[f64]], order: usize) -> Result<(), NumericsError> {
     series.iter().try_for_each(|s| check_finite("series", s))?;
     let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
     check_least("samples of the longest series", longest, order + 2)?;
-    let centred: Vec<Vec<f64>> = series.iter().map(|s| centred(s)).collect();
-    check_least(
-        "series that vary",
-        centred
-            .iter()
-            .filter(|x| x.iter().any(|v| *v != 0.0))
-            .count(),
-        1,
-    )?;
-    Ok(centred)
+    let varies = |s: &&&[f64]| centred(s).iter().any(|v| *v != 0.0);
+    check_least("series that vary", series.iter().filter(varies).count(), 1)
 }
 
-pub(crate) fn centred(series: &[f64]) -> Vec<f64> {
+fn centred(series: &[f64]) -> Vec<f64> {
     let mean = series.iter().sum::<f64>() / series.len().max(1) as f64;
     series.iter().map(|v| v - mean).collect()
 }

@@ -3,5 +3,4 @@
 pub mod autoregressive;
 pub mod distributions;
 pub mod extent;
-pub mod long_run;
 pub mod sandwich_covariance;

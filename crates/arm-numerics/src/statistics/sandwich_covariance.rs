@@ -2,15 +2,13 @@
 //!
 //! The estimate minimises `½‖R x − z‖²` with some constraints binding. In the directions that stay free its covariance is the sandwich
 //! `H⁻¹ M H⁻¹`, `H = RᵀR`, where M is the covariance of the score `Σ y (b − yᵀx)`. Scores summed over a trial (a cluster) are independent between trials
-//! whatever the noise within a trial is, so M is estimated from their spread ([`SandwichCovariance::clustered`]); for a single trial M is a long-run covariance
-//! ([`crate::statistics::long_run`]) or comes from blocks longer than the correlation time ([`blocks`]).
+//! whatever the noise within a trial is, so M is estimated from their spread; for a single trial from blocks longer than the correlation time ([`blocks`]).
 //!
-//! Errors that repeat in every trial alike (calibration, lengths) are in none of these: add their covariance with [`Matrix::plus`].
+//! Errors that repeat in every trial alike (calibration, lengths) are in neither: their covariance is added.
 
 use crate::error::{NumericsError, check_finite, check_least, check_len, check_range};
 use crate::linalg::matrix::{Matrix, dot};
 use crate::linalg::orthogonal::{Qr, solve_upper, solve_upper_transposed};
-use crate::statistics::distributions::student_t_quantile;
 use std::ops::Range;
 
 /// Gradients of binding constraints that depend on each other to this degree count once.
@@ -137,83 +135,6 @@ impl SandwichCovariance {
         let rows = root.transpose();
         Matrix::from_fn(p, p, |i, j| variance * dot(rows.column(i), rows.column(j)))
     }
-
-    /// Covariance from the scores of `n ≥ 2` independent clusters: `H⁻¹ (n/(n−1) Σ_g (s_g − s̄)(s_g − s̄)ᵀ) H⁻¹`, `p × p`.
-    ///
-    /// Without a prior the mean score `s̄` of the free directions is zero; with one it is the pull of the prior, which does not vary and is left out.
-    /// Intervals use Student's t with `n − 1` degrees of freedom.
-    ///
-    /// * `scores` - per cluster `Σ y (b − yᵀx)`: [`crate::Factor::score`] of the cluster's factor at the estimate
-    ///
-    /// # Errors
-    /// [`NumericsError::TooFew`] below two clusters, [`NumericsError::Length`], [`NumericsError::NotFinite`].
-    pub fn clustered(&self, scores: &[Vec<f64>]) -> Result<Matrix, NumericsError> {
-        let n = scores.len();
-        check_least("clusters", n, 2)?;
-        let mut moves = Vec::with_capacity(n);
-        for score in scores {
-            check_finite("scores", score)?;
-            moves.push(self.apply(score)?);
-        }
-        let p = self.basis.rows();
-        let mean: Vec<f64> = (0..p)
-            .map(|i| moves.iter().fold(0.0, |sum, u| sum + u[i]) / n as f64)
-            .collect();
-        let correction = n as f64 / (n as f64 - 1.0);
-        let element = |i: usize, j: usize| {
-            correction
-                * moves
-                    .iter()
-                    .fold(0.0, |sum, u| sum + (u[i] - mean[i]) * (u[j] - mean[j]))
-        };
-        Ok(Matrix::from_fn(p, p, element))
-    }
-}
-
-/// An estimate with its interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    /// The estimate.
-    pub value: f64,
-    /// Standard error.
-    pub sd: f64,
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
-
-/// Two-sided intervals `x ± t sd` of every parameter. A parameter held by a binding constraint has variance 0: its interval is a point and says nothing.
-///
-/// * `x` - `p` estimates
-/// * `covariance` - `p × p`
-/// * `dof` - degrees of freedom of the covariance, clusters − 1
-/// * `level` - 0.95 for 95 %
-///
-/// # Errors
-/// [`NumericsError::Length`], [`NumericsError::NotFinite`]; [`NumericsError::OutOfRange`] for a level not in (0, 1) or a negative variance.
-pub fn intervals(
-    x: &[f64],
-    covariance: &Matrix,
-    dof: f64,
-    level: f64,
-) -> Result<Vec<Interval>, NumericsError> {
-    check_len("covariance (columns)", covariance.cols(), x.len())?;
-    check_len("covariance (rows)", covariance.rows(), x.len())?;
-    check_finite("x", x)?;
-    check_range("level", level, [1e-12, 1.0 - 1e-12])?;
-    let t = student_t_quantile(0.5 + 0.5 * level, dof)?;
-    let interval = |i: usize| {
-        check_range("variance", covariance[(i, i)], [0.0, f64::MAX])?;
-        let sd = covariance[(i, i)].sqrt();
-        Ok(Interval {
-            value: x[i],
-            sd,
-            low: x[i] - t * sd,
-            high: x[i] + t * sd,
-        })
-    };
-    (0..x.len()).map(interval).collect()
 }
 
 /// Cuts `n` samples into blocks of at least `shortest` samples, as many and as equal as possible; one block if there are fewer samples.
@@ -231,9 +152,9 @@ pub fn blocks(n: usize, shortest: usize) -> Result<Vec<Range<usize>>, NumericsEr
         .collect())
 }
 
-/// Share of the prior's variance that the data removed, `1 − posterior/prior`, between 0 (nothing learnt) and 1.
+/// Share of the prior's variance that the data removed, `1 − posterior/prior`, between 0 (no information) and 1.
 ///
-/// It says what the data **and the priors of the other parameters** imply: a parameter in the null space can have a large ratio. Read it with
+/// It measures the information of the data **and of the priors of the other parameters**: a parameter in the null space can have a large ratio. Read it with
 /// `RankReport::undetermined_share` of `arm-ident`.
 ///
 /// # Errors

@@ -105,8 +105,7 @@ fn merging_equals_pushing_everything() {
             .expect("finite");
         condenser
     };
-    let mut merged = part(0, 300);
-    merged.merge(&part(300, 711)).expect("same size");
+    let mut merged = part(0, 711);
     merged
         .merge_factor(&part(711, 900).finish())
         .expect("same size");
@@ -122,13 +121,11 @@ fn pushing_does_not_allocate() {
     let mut noise = Noise::new(5);
     let (rows, b) = (noise.vector(12 * 1000), noise.vector(1000));
     let mut condenser = Condenser::new(12);
-    let other = condenser.clone();
     let counted = allocation_counter::measure(|| {
         for (row, &b) in rows.chunks_exact(12).zip(&b) {
             condenser.push(row, b).expect("finite");
         }
         condenser.push_block(&rows, &b).expect("finite");
-        condenser.merge(&other).expect("same size");
     });
     assert_eq!(counted.count_total, 0);
     assert_eq!(condenser.rows(), 2000);
@@ -202,7 +199,6 @@ fn refuses_bad_rows_and_keeps_its_state() {
         assert_eq!(partly.rows(), 2);
     }
     assert!(condenser.push_block(&[1.0; 3], &[1.0; 2]).is_err());
-    assert!(condenser.merge(&Condenser::new(3)).is_err());
     assert!(condenser.merge_factor(&Condenser::new(3).finish()).is_err());
     assert_eq!(condenser.rows(), 1);
     let message = condenser

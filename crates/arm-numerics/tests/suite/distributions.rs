@@ -1,9 +1,7 @@
 use arm_numerics::NumericsError;
-use arm_numerics::statistics::distributions::{
-    chi_square_tail, student_t_quantile, student_t_two_sided_tail,
-};
+use arm_numerics::statistics::distributions::{chi_square_tail, student_t_quantile};
 
-/// Agreement asked of quantiles and tails.
+/// Relative agreement of quantiles.
 const TOLERANCE: f64 = 1e-10;
 
 /// scipy 1.17.1: `stats.t.ppf(p, dof)`; each row also checked with mpmath's 40-digit incomplete beta function.
@@ -36,36 +34,6 @@ fn quantiles_are_those_of_scipy() {
     assert_eq!(student_t_quantile(0.5, 3.0).expect("in range"), 0.0);
 }
 
-/// mpmath, 40 digits: `betainc(dof/2, 1/2, 0, dof/(dof+t²), regularized=True)`.
-#[test]
-fn tails_are_those_of_mpmath() {
-    for (t, dof, expected) in [
-        (0.5, 1.0, 0.704_832_764_699_133_5),
-        (2.0, 9.0, 0.076_552_823_770_701_04),
-        (-5.0, 3.0, 0.015_392_438_073_302_301),
-        (1.96, 1000.0, 0.050_273_184_955_748_718),
-        (30.0, 4.0, 7.352_856_097_661_322_1e-6),
-        (0.01, 60.0, 0.992_054_463_517_930_8),
-    ] {
-        let found = student_t_two_sided_tail(t, dof).expect("in range");
-        assert!(
-            (found / expected - 1.0).abs() < TOLERANCE,
-            "{t} {dof}: {found}"
-        );
-    }
-}
-
-#[test]
-fn tail_undoes_quantile() {
-    for dof in [0.5, 1.0, 4.0, 9.0, 77.7, 1e4, 1e7] {
-        for probability in [0.5001, 0.7, 0.9, 0.999, 1.0 - 1e-12] {
-            let t = student_t_quantile(probability, dof).expect("in range");
-            let back = 1.0 - 0.5 * student_t_two_sided_tail(t, dof).expect("in range");
-            assert!((back - probability).abs() < 1e-12, "{probability} {dof}");
-        }
-    }
-}
-
 #[test]
 fn refuses_what_has_no_answer() {
     assert!(matches!(
@@ -80,8 +48,6 @@ fn refuses_what_has_no_answer() {
         Err(NumericsError::OutOfRange { name: "dof", .. })
     ));
     assert!(student_t_quantile(f64::NAN, 3.0).is_err());
-    assert!(student_t_two_sided_tail(f64::NAN, 3.0).is_err());
-    assert_eq!(student_t_two_sided_tail(f64::INFINITY, 3.0), Ok(0.0));
 }
 
 #[test]

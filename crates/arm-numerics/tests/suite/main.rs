@@ -8,7 +8,6 @@ mod derivative;
 mod distributions;
 mod factor;
 mod filter;
-mod long_run;
 mod noise;
 mod program;
 mod sandwich_covariance;

@@ -211,7 +211,7 @@ fn an_ellipse_meets_the_ball_where_the_secular_equation_says() {
     );
 }
 
-/// Planar pseudo-inertia: `I m ≥ h²` as a cone. Data that ask for I = 0.1, m = 1, h = 1 are drawn to its surface, a bound on m included.
+/// Planar pseudo-inertia: `I m ≥ h²` as a cone. Data with I = 0.1, m = 1, h = 1 are projected onto its surface, a bound on m included.
 #[test]
 fn physical_consistency_binds_together_with_a_bound() {
     let l = 0.3;

@@ -273,7 +273,7 @@ value_class!(
     ]
 );
 
-/// What `dataset.toml` says of one trial.
+/// One trial in `dataset.toml`.
 ///
 /// Parameters
 /// ----------

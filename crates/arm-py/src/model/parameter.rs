@@ -64,7 +64,7 @@ impl ParameterId {
     }
 }
 
-/// What a model says of one parameter, with its bounds and unit.
+/// One parameter of a model, with its bounds and unit.
 #[pyclass(frozen, eq, module = "armrs.model")]
 #[derive(Clone, PartialEq)]
 pub struct ParameterInfo(pub arm_model::ParameterInfo);

@@ -4,9 +4,9 @@ use arm_model::{Table, Value};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString};
 
-/// Most items that are looked at of something that can be iterated.
+/// Most items that are read of an iterable.
 const MAX_ITEMS: usize = 10_000;
-/// Deepest nesting that is looked at.
+/// Deepest nesting that is read.
 const MAX_DEPTH: usize = 16;
 
 /// A Python object as a value. What no file can hold is kept as it is shown.

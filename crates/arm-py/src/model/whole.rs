@@ -268,25 +268,6 @@ impl Model {
         heavier.map(Self::wrap).map_err(refused)
     }
 
-    /// Return a model with other effects in its joints: what the keys of a joint can say stands there, the rest is listed.
-    ///
-    /// Parameters
-    /// ----------
-    /// fitted : sequence of Effect
-    ///     All effects of the joints.
-    /// others : sequence of Effect
-    ///     The other effects of the model.
-    fn with_joint_effects(
-        &self,
-        fitted: &Bound<'_, PyAny>,
-        others: &Bound<'_, PyAny>,
-    ) -> PyResult<Self> {
-        let fitted = each("fitted", fitted, |e: &Effect| e.0)?;
-        let others = each("others", others, |e: &Effect| e.0)?;
-        let changed = self.inner.with_joint_effects(&fitted, &others);
-        changed.map(Self::wrap).map_err(refused)
-    }
-
     /// Write `model.toml`; reading it back gives an equal model, to the last bit. The file is replaced at once or not at all.
     ///
     /// Parameters

@@ -114,7 +114,7 @@ impl OnlineEstimator {
         Ok(Self { inner })
     }
 
-    /// Takes the rows of a log in, one control period each, and tells its state after every `every`-th of them.
+    /// Processes the rows of a log, one control period each, and returns its state after every `every`-th of them.
     ///
     /// Parameters
     /// ----------

@@ -71,7 +71,7 @@ impl OnlineMonitor {
         })
     }
 
-    /// Looks at control periods until the first that is not allowed, and from then on at none.
+    /// Checks control periods up to the first that is not allowed.
     ///
     /// Parameters
     /// ----------

@@ -1,4 +1,4 @@
-//! Rows of numbers from Python, and a state that several threads may ask for.
+//! Rows of numbers from Python, and a state that several threads may use.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -29,7 +29,7 @@ impl Value {
 }
 
 result_class! {
-    /// A movement that would tell two explanations apart.
+    /// A movement that would distinguish two explanations.
     Separation of core::Separation, in "armrs.workflows.gap" {
         /// Joint angles, a tuple a waypoint [deg].
         waypoints_deg: Vec<Vec<f64>>, "deg";
@@ -39,7 +39,7 @@ result_class! {
         acceleration_rad_s2: f64, "rad/s²";
         /// "trapezoid" or "smooth".
         shape: String, "";
-        /// Standard deviations that the two are apart by the fit trials alone, everything refitted: no more than their misfits say.
+        /// Distance of the two in standard deviations by the fit trials alone, everything refitted.
         now: f64, "standard deviations";
         /// The same with one such trial more.
         then: f64, "standard deviations";
@@ -61,7 +61,7 @@ result_class! {
         worse: f64, "";
         /// Squared cosine between what the two would show on these movements: 1 cannot be distinguished; NaN where it was not computed.
         likeness: f64, "";
-        /// A movement that would tell the two apart, in words; its numbers are in `separation`.
+        /// A movement that would distinguish the two, in words; its numbers are in `separation`.
         separating_movement: Option<String>, "", or None;
         /// The movement as numbers.
         separation: Option<core::Separation>, "", or None;

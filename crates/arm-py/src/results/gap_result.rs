@@ -101,7 +101,7 @@ result_class! {
         lack: [Lack; 2], "";
         /// Rounds of the search.
         search_trace: Vec<core::SearchStep>, "";
-        /// What a reader should know of the data.
+        /// Remarks on the data.
         warnings: Vec<String>, "";
         /// The model with the named effects, everything refitted.
         model: arm_model::Model, "";
@@ -129,7 +129,7 @@ impl GapResult {
 }
 
 result_class! {
-    /// What a first look shows.
+    /// Result of the first-order screening.
     Screening of core::Screening, in "armrs.workflows.gap" {
         /// Segments, contact and known effects refitted.
         model: arm_model::Model, "";

@@ -25,7 +25,7 @@ result_class! {
         std: f64, "";
         /// SI unit.
         unit: String, "";
-        /// Interval at the level asked for.
+        /// Interval at the requested level.
         interval: (f64, f64), "";
         /// What the value rests on: "data", "prior" or "bound". A prior's value is an assumption that the data left open, not a measurement.
         decided_by: Decision, "";
@@ -56,7 +56,7 @@ impl Estimate {
 /// samples : ndarray of int, shape (m,)
 ///     Positions of the samples that were used in the trial.
 /// measured, fitted : ndarray, shape (m, n_joints)
-///     Joint torques that the measurement asks for, and those of the fitted model [N m].
+///     Joint torques that follow from the measurement, and those of the fitted model [N m].
 #[pyclass(frozen, eq, module = "armrs.workflows.identify")]
 #[derive(Clone, PartialEq)]
 pub struct Fit(pub Arc<core::Fit>);
@@ -92,7 +92,7 @@ impl Fit {
     fn samples<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<usize>> {
         self.0.samples.to_pyarray(py)
     }
-    /// Joint torques that the measurement asks for [N m], shape (m, n_joints).
+    /// Joint torques that follow from the measurement [N m], shape (m, n_joints).
     #[getter]
     fn measured<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         table(py, &self.0.measured)
@@ -142,7 +142,7 @@ result_class! {
         misfits: Vec<String>, "";
         /// What of the model the method does not take into account, or finds nothing about in these movements.
         left_out: Vec<String>, "";
-        /// Which unknowns the movements cannot tell apart, in words.
+        /// Which unknowns the movements cannot distinguish, in words.
         trades: Vec<String>, "";
         /// Whether no torque acted: all parameters are known up to one common factor, which was taken from the model.
         scale_free: bool, "";

@@ -38,7 +38,7 @@ impl Prediction {
 }
 
 result_class! {
-    /// What movements will show, and what they ask of the robot.
+    /// Forecast of movements: certainty of the parameters, and the load of the robot.
     Forecast of core::Forecast, in "armrs.workflows.plan" {
         /// Base parameters and parameters of effects.
         predictions: Vec<core::Prediction>, "";
@@ -62,11 +62,11 @@ result_class! {
     Slowed of core::Slowed, in "armrs.workflows.plan" {
         /// Number of the movement, from 1.
         movement: usize, "";
-        /// Its share of the speed that was asked for; of the acceleration that squared.
+        /// Its share of the requested speed; of the acceleration that squared.
         pace: f64, "";
         /// What it would exceed if it were faster, by its name in `Limits`.
         limit: String, "";
-        /// What that would be at the speed that was asked for, in `unit`.
+        /// Value of that quantity at the requested speed, in `unit`.
         found: f64, "";
         /// The limit, in `unit`.
         allowed: f64, "";

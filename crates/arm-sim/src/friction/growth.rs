@@ -1,4 +1,4 @@
-//! Joints that run away from rest because their friction falls with speed.
+//! Joints that accelerate away from rest because their friction falls with speed.
 
 use arm_core::effect::{Motion, States, dry_friction};
 
@@ -16,7 +16,7 @@ pub(super) fn growth<const N: usize>(
     modes: &Modes<N>,
     (most, yielding): (Option<[f64; N]>, impl FnOnce() -> [f64; N]),
 ) -> f64 {
-    /// A change of speed in which friction hardly bends \[rad/s\].
+    /// A change of speed in which friction is almost linear \[rad/s\].
     const CHANGE: f64 = 1e-6;
     let mut faster = *motion;
     for j in 0..N {

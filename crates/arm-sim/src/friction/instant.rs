@@ -8,19 +8,19 @@ use crate::model::{Link, Model};
 use crate::state::{Input, Outcome, difference, powers, sum};
 use crate::terms::{Constraint, Terms};
 
-/// What the dry friction of a joint does.
+/// The mode of dry friction in a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Mode {
     /// There is none.
     None,
-    /// It resists with all that it can against this direction, 1 or −1. Zero for a joint at rest that its friction cannot hold
-    /// because something else does.
+    /// It resists with its largest torque against this direction, 1 or −1. Zero for a joint at rest that is held by something
+    /// other than friction.
     Slips(f64),
     /// It holds the joint.
     Sticks,
 }
 
-/// What friction does in each joint.
+/// The mode of each joint.
 pub(crate) type Modes<const N: usize> = [Mode; N];
 
 /// What follows from state and input with friction.
@@ -53,7 +53,7 @@ impl<T: Scalar, const N: usize> Friction<T, N> {
     }
 }
 
-/// Share by which a torque may be beyond what friction holds, which is rounding.
+/// Share by which a torque may exceed the largest friction by rounding.
 const ROUNDING: f64 = 1e-10;
 /// Speed of a rigidly led joint that is rounding \[rad/s\].
 const LED_STILL: f64 = 1e-9;
@@ -92,7 +92,7 @@ pub(crate) fn reserve<const N: usize>(dry: &Friction<f64, N>, joint: usize) -> f
     }
 }
 
-/// What a newton of force through a joint adds to its friction \[m\].
+/// Derivative of a joint's friction to the force through it \[m\].
 ///
 /// * `now` - its friction \[N m\]
 fn slope<const N: usize>(
@@ -126,14 +126,14 @@ impl<const N: usize> Answer<N> {
     }
 }
 
-/// An arm in one state, which answers any friction and any torques.
+/// An arm in one state, for which accelerations are computed with any friction and any torques.
 pub(super) struct Arm<'a, const N: usize> {
     model: &'a Model<f64, N>,
     input: &'a Input<f64, N>,
     /// Without joint forces.
     motion: Motion<f64, N>,
     pose: Pose<f64, N>,
-    /// Of a contact that gives way, and the power lost in it.
+    /// Of a compliant contact, and the power lost in it.
     contact: (Plane<f64>, f64),
     driving: Joints<f64, N>,
     form: Form<N>,
@@ -175,11 +175,11 @@ impl<'a, const N: usize> Arm<'a, N> {
         }
     }
 
-    /// Finds what friction does in each joint, and what follows.
+    /// Finds the mode of each joint, and the response.
     ///
-    /// A joint that moves slips. What joints at rest do is a linear complementarity problem in their accelerations: each sticks
+    /// A joint that moves slips. The modes of joints at rest solve a linear complementarity problem in their accelerations: each sticks
     /// within what holds it, or slips the way in which it is accelerated. With `ahead` \[s\] it is one of all joints, in their
-    /// speeds after that time. From all of them sticking, the first that cannot be so changes, until none is left: Murty's
+    /// speeds after that time. Starting from all of them sticking, the first that violates its conditions changes its mode, until none is left: Murty's
     /// principal pivoting, which ends where the inertia matrix is positive definite.
     pub(super) fn modes(
         &self,
@@ -228,14 +228,14 @@ impl<'a, const N: usize> Arm<'a, N> {
             modes[joint] = mode;
             solved = self.solve(memory, (&modes, ahead));
         }
-        // Where friction does not grow with what it does only rounding keeps a mode from being found: either will do.
+        // Where friction does not grow with the joint force, only rounding prevents a solution: either mode is right.
         if model.feels_joint_force {
             solved.jam = (0..N).find(|&j| open[j]).map(|j| (j, f64::INFINITY));
         }
         (modes, solved)
     }
 
-    /// Joint whose friction may have several answers, and the largest that a newton metre of it can add to it.
+    /// Joint whose friction may have several solutions, and its largest loop gain.
     ///
     /// With a joint force that is linear in the friction, `λ = ±μ |F₀ + λ f|` has one solution for each sign if `μ |f| < 1`. Beyond
     /// that it has two or none, and whether the joint sticks or slips does not follow from the law (Painlevé 1895).
@@ -323,7 +323,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         }
     }
 
-    /// How fast each joint gives way to a newton metre in it, whatever its speed \[rad/(s² N m)\].
+    /// Acceleration of each joint per newton metre in it, at any speed \[rad/(s² N m)\].
     pub(super) fn yielding(&self) -> [f64; N] {
         core::array::from_fn(|j| self.column(j).0.qdd[j])
     }
@@ -386,7 +386,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         self.through_joints(&less)
     }
 
-    /// Takes from an answer what joints that stick do, so that these have the accelerations wanted of them.
+    /// Subtracts the torques of joints that stick from a response, so that these joints have the required accelerations.
     ///
     /// Returns their torques, and which of them stick: not those that nothing but the handle moves.
     fn hold(
@@ -408,7 +408,7 @@ impl<'a, const N: usize> Arm<'a, N> {
             }
         }
         for k in 0..N {
-            // Not a number counts as stiff.
+            // NaN counts as stiff.
             held[k] = sticks[k] && m[k][k] > STIFF * own[k];
             if !held[k] {
                 continue;
@@ -438,7 +438,7 @@ impl<'a, const N: usize> Arm<'a, N> {
     }
 }
 
-/// What friction does at one instant, and what the joints that stick are to do.
+/// Friction at one instant, and the required accelerations of joints that stick.
 struct Rubbing<'a, const N: usize> {
     modes: &'a Modes<N>,
     /// Speeds that joints lose in a second, where they are to rest after a time \[rad/s²\].
@@ -456,7 +456,7 @@ struct Found<const N: usize> {
 }
 
 impl<const N: usize> Rubbing<'_, N> {
-    /// What follows under given torques besides friction; the joint forces are put into the motion where an effect feels them.
+    /// The response to given torques besides friction; joint forces are written into the motion where an effect depends on them.
     #[inline(always)]
     fn under(
         &self,
@@ -530,7 +530,7 @@ impl<const N: usize> Rubbing<'_, N> {
             most = dry_friction(&model.effects, motion, self.memory);
             let missing = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j] - slips[j]);
             let size = 1.0 + slips.amax();
-            // What is not finite is not for this to say.
+            // A state that is not finite is reported elsewhere.
             let lost = !missing.iter().all(|m| m.is_finite());
             if jam.is_some() || lost || missing.amax() <= 1e-12 * size {
                 return found(most, jam);

@@ -15,7 +15,7 @@ use crate::SimulationError;
 
 /// Hertz. So far above any step rate that a joint's error is removed within one step and its softness vanishes.
 const STIFF: f64 = 1e9;
-/// Newton metres a radian a second with which a motor that is dry friction wants rest: all that it has, at any speed.
+/// Gain of a motor that is dry friction \[N m s/rad\]: it gives its largest torque at any speed.
 const RIGID: f64 = 1e12;
 
 /// Times as many sweeps with motors, which rotors and dry friction are: what the sweeps leave of their torque is lost, whereas a joint that they leave open
@@ -29,7 +29,7 @@ pub(super) struct World<const N: usize> {
     world: PhysicsWorld,
     links: [RigidBodyHandle; N],
     joints: [ImpulseJointHandle; N],
-    /// Joints of their own for dry friction: motors that want rest and have no more torque than it.
+    /// Separate joints for dry friction: motors with the target speed zero and the torque of the friction.
     friction: [Option<ImpulseJointHandle>; N],
     held: Option<Held>,
     /// Where the handle holds the last segment, in its own frame \[m\].
@@ -245,7 +245,7 @@ impl<const N: usize> World<N> {
 
     /// Adds a force to a segment at a point of the plane.
     ///
-    /// Not `add_force_at_point`: before the first step rapier does not know where the centre of mass is.
+    /// Not `add_force_at_point`: before the first step rapier has not computed the centre of mass.
     fn pull(&mut self, link: usize, force: Plane<f64>, at: Plane<f64>) {
         let body = &mut self.world.bodies[self.links[link]];
         let com = vector(self.chain.segments()[link].com);

@@ -33,7 +33,7 @@ fn rk4_is_of_fourth_order() {
     assert!((order - 4.0).abs() < 0.4, "order {order}");
 }
 
-/// An effect that does nothing, but is not linear in the motion of its joint, makes every step ask for all that acts.
+/// An effect that does nothing, but is not linear in the motion of its joint, makes every step evaluate everything that acts.
 #[test]
 fn the_short_way_through_a_rig_leaves_nothing_out() {
     let alter: [&dyn Fn(&mut Experiment<3>); 4] = [

@@ -1,4 +1,4 @@
-//! Effects that depend on muscle activity, which a series tells.
+//! Effects that depend on muscle activity, which a series gives.
 
 use arm_core::effect::{Effect, Kind};
 use arm_sim::{

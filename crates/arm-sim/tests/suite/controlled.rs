@@ -76,7 +76,7 @@ fn every_fault_stops_the_robot_within_two_periods() {
         for (fault, reason) in faults {
             let done = run(4.0, Some((at, fault)), seed);
             let stop = done.stop.expect("a stop");
-            // An encoder that freezes in fast motion looks like an impossible deceleration at once.
+            // An encoder that freezes in fast motion reads as an impossible deceleration at once.
             let braked = matches!(fault, Fault::Frozen(_)) && stop.reason == Reason::Limit;
             assert!(stop.reason == reason || braked, "{fault:?}: {stop:?}");
             let periods = done.periods_to_stop.expect("a stop after the fault");

@@ -77,7 +77,7 @@ impl<const N: usize> Reference<N> {
         torque
     }
 
-    /// What follows in given modes; nothing where a force that grows with itself has no answer.
+    /// What follows in given modes; nothing where friction that grows with the joint force has no solution.
     fn follow(&self, time: f64, at: &Motion<N>, modes: &Modes<N>) -> Option<Follows<N>> {
         let (mut angle, mut speed) = (0.0, 0.0);
         let (mut joint, mut rate, mut bend) = ([0.0; 2], [0.0; 2], [0.0; 2]);
@@ -353,7 +353,7 @@ impl<const N: usize> Reference<N> {
         )
     }
 
-    /// The motion at equal intervals; nothing where the law has no answer.
+    /// The motion at equal intervals; nothing where the law has no solution.
     pub fn run(
         &self,
         start: ([f64; N], [f64; N]),

@@ -1,4 +1,4 @@
-//! A handle that yields as it is told, an arm that is carried, and a loop that is stopped where it is not stable.
+//! A compliant handle, an arm that is carried, and a loop that is stopped where it is not stable.
 
 use arm_core::{Joints, Pose, Shape, gravity, models::mechanical_arm};
 use arm_sim::{

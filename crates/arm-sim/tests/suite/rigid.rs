@@ -56,7 +56,7 @@ fn two_joints_follow_the_desired_movement() {
     }
 }
 
-/// The multiplier is the force that inverse dynamics asks for.
+/// The multiplier is the force that inverse dynamics requires.
 #[test]
 fn the_force_is_that_of_inverse_dynamics() {
     let r = run(&rigid(smooth(1.0)));

@@ -47,7 +47,7 @@ def export_model(model: Model | str | os.PathLike[str], path: str | os.PathLike[
     ----------
     model : Model or path
     path : path
-        Its suffix says the format: `.urdf`, `.xml` (MJCF) or `.osim`.
+        Its suffix is the format: `.urdf`, `.xml` (MJCF) or `.osim`.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def import_model(path: str | os.PathLike[str]) -> Model:
     -------
     Model
         Angles are counted as in the file, from the line of the segment before; of the first segment from forward. Where the file
-        counts from elsewhere, or forward is not its +y, a warning says so.
+        counts from elsewhere, or forward is not its +y, a warning states it.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def import_model(path: str | os.PathLike[str]) -> Model:
 
 
 def read_model(path: str | os.PathLike[str]) -> Imported:
-    """Return what `import_model` does, with what its user has to know."""
+    """Return what `import_model` does, with remarks for its user."""
     source = checks.path("path", path)
     read = _READERS.get(source.suffix.lower())
     if read is None:

@@ -48,14 +48,14 @@ class Hinge:
 
 @dataclass(frozen=True)
 class Imported:
-    """A model, what its user has to know, a line each, and what is added to the angles of the file [rad]."""
+    """A model, remarks for its user, a line each, and what is added to the angles of the file [rad]."""
 
     model: Model
     notes: tuple[str, ...]
     zeros: tuple[float, ...]
 
     def without_stops(self, joints: Sequence[str]) -> Imported:
-        """Say which joints of the file have a range: a chain of segments has no stops."""
+        """Return which joints of the file have a range: a chain of segments has no stops."""
         if not joints:
             return self
         note = f"{', '.join(joints)}: the range of motion is left out; effect end_range gives a joint stiffness at the ends of one"

@@ -83,7 +83,7 @@ def read(text: str) -> Imported:
 
 
 def _refuse_foreign(robot: ET.Element) -> None:
-    """Refuse what would change the arm and is not read, or what says it twice: better no arm than another one."""
+    """Refuse elements that would change the arm and are not read, or that are stated twice: better no arm than another one."""
     for parent in (element for element in robot.iter() if element.tag in ("link", "joint", "inertial")):
         for tag in _ONCE:
             if (count := len(parent.findall(tag))) > 1:

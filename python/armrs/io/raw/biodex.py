@@ -15,7 +15,7 @@ _NAMES = {"TIME": "time", "TORQUE": "torque 1", "POSITION": "position 1", "POS (
 """What Biodex calls a column -> the name by which it is recognised. `POS (ANAT)` is the position with another zero."""
 _NAME = re.compile(r"POS \(ANAT\)|\S+")
 _HEAD = 12
-"""Lines in which the names of the columns are looked for."""
+"""Lines in which the names of the columns are searched for."""
 
 
 def recognises(lines: Sequence[str]) -> bool:

@@ -16,7 +16,7 @@ def recognises(lines: Sequence[str]) -> bool:
 
 
 def read(path: Path, lines: Sequence[str]) -> RawTable:
-    """Refuse the file, and say what to do.
+    """Refuse the file, with what to do.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from .table import RawTable
 from .text import table_of
 
 _HEAD = 12
-"""Lines in which the titles are looked for."""
+"""Lines in which the titles are searched for."""
 
 
 def recognises(lines: Sequence[str]) -> bool:

@@ -15,7 +15,7 @@ from .. import reader_process
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _DEEPEST = 4
-"""Structs within structs that are looked into."""
+"""Deepest nesting of structs that is read."""
 _MOST = 100_000_000
 """Values of one array of a version 7.3 file, whose size is stated by the file whatever it holds."""
 
@@ -89,7 +89,7 @@ def _keep(name: str, value: np.ndarray, found: dict[str, np.ndarray]) -> None:
 
 
 def _unit_of(item: Any) -> str:
-    """Return what the attribute `units` of an HDF5 dataset says, as h5py, PyTables, netCDF-4 and NWB write it; empty without one."""
+    """Return the attribute `units` of an HDF5 dataset, as h5py, PyTables, netCDF-4 and NWB write it; empty without one."""
     stated = next((item.attrs[key] for key in item.attrs if key.lower() in ("unit", "units")), "")
     stated = stated.flat[0] if isinstance(stated, np.ndarray) and stated.size else stated
     return stated.decode("utf-8", "replace") if isinstance(stated, bytes) else stated if isinstance(stated, str) else ""

@@ -50,7 +50,7 @@ def _seconds(stamps: np.ndarray) -> np.ndarray:
 
 
 def read_motion_table(path: Path) -> RawTable:
-    """Read an OpenSim MOT or STO file; its header says whether angles are in degrees."""
+    """Read an OpenSim MOT or STO file; its header states whether angles are in degrees."""
     motion = read_motion(path)
     unit = {True: "deg", False: "rad", None: ""}[motion.in_degrees]
     notes = (f"angles in {unit}, as the header says",) if unit else ()

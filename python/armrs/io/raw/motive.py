@@ -26,7 +26,7 @@ def recognises(lines: Sequence[str]) -> bool:
 
 
 def read(path: Path, lines: Sequence[str]) -> RawTable:
-    """Read the markers of an export; up is y, as Motive has it unless told otherwise.
+    """Read the markers of an export; up is y, the default of Motive.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from . import biodex, delsys, labchart, motive, qualisys, text, vicon
 from .table import RawTable
 
 _PROGRAMS = (vicon, qualisys, motive, biodex, labchart, delsys)
-"""Each tells by the first lines whether it `recognises` a text, and `read`s it. A new one is one module and one name here."""
+"""Each `recognises` a text by its first lines, and `read`s it. A new one is one module and one name here."""
 
 
 def read_text(path: Path) -> list[RawTable]:

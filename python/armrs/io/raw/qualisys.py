@@ -73,7 +73,7 @@ def _with_beside(path: Path, head: dict[str, list[str]], values: np.ndarray) -> 
 
 
 def _belongs_to(path: Path) -> str | None:
-    """Return the stem of the file that a file's name says it belongs to."""
+    """Return the stem of the file that a file belongs to by its name."""
     match = _BESIDE.match(path.stem)
     return match["name"] if match else None
 

@@ -18,7 +18,7 @@ from .units import UNITS
 _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*)\s*[\])>]\s*$")
 _AFTER_IN = re.compile(r"^(?P<name>.*\S)\s+in\s+(?P<unit>\S+)$", flags=re.IGNORECASE)
 _SAYS_LITTLE = re.compile(r"[xyzlr]|\d+", flags=re.IGNORECASE)
-"""Names that say little by themselves."""
+"""Names that need the title of their group."""
 _BEFORE_UNIT = re.compile(r"\s*[/,]\s*|[_\s]+")
 
 
@@ -55,7 +55,7 @@ class RawColumn:
 
 @dataclass(frozen=True)
 class Remark:
-    """Words that somebody wrote beside a sample: the name of their column, the row from 0, the text."""
+    """Words that were recorded with a sample: the name of their column, the row from 0, the text."""
 
     column: str
     row: int
@@ -78,7 +78,7 @@ class RawTable:
     markers : Markers or None
         Trajectories of markers, where the recording has them; the columns may be on another clock.
     remarks : tuple of Remark
-        What the columns of words say.
+        Contents of the columns of words.
     plane : ndarray, shape (2, 3), or None
         Unit vectors forward and up in the plane of the movement, in the axes of the markers, where the angles are those of markers.
     """
@@ -153,7 +153,7 @@ def headed(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[s
 def grouped(groups: Sequence[str], names: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return names and units of columns that stand in groups: a word above several of them, as `Force [N]` above `y` and `z`.
 
-    A name that says little by itself, or stands there twice, takes the word of its group before it, and its unit.
+    A name that needs that, or stands there twice, takes the word of its group before it, and its unit.
 
     >>> grouped(["", "Force [N]", ""], ["t", "y", "z"], ["s", "", ""])
     (['t', 'Force y', 'Force z'], ['s', 'N', 'N'])
@@ -174,7 +174,7 @@ def grouped(groups: Sequence[str], names: Sequence[str], units: Sequence[str]) -
 
 
 def remarks_of(name: str, cells: Sequence[str]) -> tuple[Remark, ...]:
-    """Return what stands in a column of words, once where rows one after the other say the same; an empty cell says nothing.
+    """Return what stands in a column of words, once where consecutive rows are the same; empty cells are skipped.
 
     >>> [(remark.row, remark.text) for remark in remarks_of("note", ["", "cough", "cough", "", "cough"])]
     [(1, 'cough'), (4, 'cough')]

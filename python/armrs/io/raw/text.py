@@ -24,7 +24,7 @@ _WORKBOOK = b"\xd0\xcf\x11\xe0"
 _COMMENT = ("#", "%", "//", '"#')
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", " ": "blanks"}
 _PROBED = 400
-"""Lines in which header, separator and decimal mark are looked for."""
+"""Lines in which header, separator and decimal mark are searched for."""
 _NAMING = 3
 """Comment lines above the samples that may hold groups, names and units of the columns."""
 _FEWEST = 3
@@ -67,19 +67,14 @@ def decoded_lines(path: Path) -> tuple[list[str], str]:
     return [line for line in re.split(r"\r\n|\r|\n", content) if line.strip()], encoding
 
 
-def read_text_table(path: Path) -> RawTable:
-    """Read a text table.
+def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
+    """Return the table in a text, from the lines and encoding of `decoded_lines`.
 
     Raises
     ------
     BadInput
         When no block of numbers is found. Without the file's name in it; the caller adds it.
     """
-    return table_of(path, *decoded_lines(path))
-
-
-def table_of(path: Path, lines: list[str], encoding: str) -> RawTable:
-    """Return the table in a text, from what `decoded_lines` returned; errors as in `read_text_table`."""
     leading = next((index for index, line in enumerate(lines) if not _is_comment(line)), len(lines))
     lines = [_THOUSANDS.sub("", line) for line in lines]
     lines = [line for index, line in enumerate(lines) if index == 0 or not _is_comment(line) or _may_name(index, leading, line)]
@@ -203,7 +198,7 @@ def _is_units(row: list[str]) -> bool:
 def _columns(
     lines: list[str], names: list[str], units: list[str], layout: _Layout, notes: list[str]
 ) -> tuple[list[RawColumn], list[Remark]]:
-    """Return the columns of numbers, and what the columns that hold words alone say."""
+    """Return the columns of numbers, and the contents of columns that hold words alone."""
     import pyarrow as pa
     from pyarrow import csv
 

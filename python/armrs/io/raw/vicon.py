@@ -18,7 +18,7 @@ _FRAMES = ("Frame", "Sub Frame")
 _HEAD = 5
 """Lines of a section above its rows: title, rate, groups, names, units."""
 _AXIS = re.compile(r"[FM][xyz]")
-"""Names that say by themselves what a channel of a force plate is."""
+"""Names of the channels of a force plate that need no title of a group."""
 
 
 @dataclass(frozen=True)

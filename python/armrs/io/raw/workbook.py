@@ -18,7 +18,7 @@ _FIRST_DAY = datetime.datetime(2000, 1, 1)
 
 
 def read_workbook(path: Path) -> list[RawTable]:
-    """Read the sheets of a workbook that hold a table; a sheet without one is left out, and said.
+    """Read the sheets of a workbook that hold a table; a sheet without one is left out, and reported.
 
     Raises
     ------

@@ -13,12 +13,12 @@ from ...model import Contact, Model
 
 _SHARE = 1.0 / 16.0
 """Error of the path through all samples, as a share of what a cubic through every second one misses of the others: about a twelfth
-where the acceleration jumps, less where it does not. The force foretold with it is that which development sessions leave."""
+where the acceleration jumps, less where it does not. The force predicted with it is that which development sessions leave."""
 _PLAIN = 0.5
 """A path is not known where it is uncertain by that many times what repeats of the movement differ by: a contact that rings makes two to
 three times as much of it, and a gap is open from half its floor on."""
 _LEAST = 8
-"""Samples below which a trial tells nothing of its path."""
+"""Fewest samples of a trial from which its path is estimated."""
 
 
 def unresolved(dataset: Dataset, led: bool) -> list[str]:
@@ -41,7 +41,7 @@ def unresolved(dataset: Dataset, led: bool) -> list[str]:
 def unresolved_movements(dataset: Dataset) -> dict[str, tuple[float, float]]:
     """Return by movement the force that its path is uncertain by, and what its repeats differ by [N], where the first is too much.
 
-    With a stiff contact the handle's path between the samples is felt as a force: a simulation misses it, whatever the arm is made of.
+    With a stiff contact the handle's path between the samples causes a force, which a simulation misses with any model of the arm.
     """
     found = {}
     for name in dict.fromkeys(t.configuration for t in dataset.trials):

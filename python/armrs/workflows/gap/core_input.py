@@ -1,4 +1,4 @@
-"""What the search in the core is asked with: trials, channels and what is known beforehand."""
+"""Input of the search in the core: trials, channels and prior knowledge."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def channel_names(dataset: Dataset, led: bool) -> list[str]:
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """What is known beforehand.
+    """Prior knowledge.
 
-    The model, and the body on which forces are stated, are those of the files; `weights` says what the samples of each trial
-    weigh, less than one where the path of its robot between the samples is not known; `own` are kinds of one's own that are asked besides.
+    The model, and the body on which forces are stated, are those of the files; `weights` are those of the samples of each trial,
+    less than one where the path of its robot between the samples is not known; `own` are user-defined kinds that are tested besides.
     """
 
     model: Model
@@ -57,7 +57,7 @@ def core_trials(dataset: Dataset) -> list[Trial]:
 
 
 def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequence[str] = ()) -> SearchSettings:
-    """Return what is known beforehand; as many threads as processors when none are given."""
+    """Return the prior knowledge; as many threads as processors when none are given."""
     unknown = unresolved_movements(dataset) if led else {}
     weights = {name: differ / math.hypot(missed, differ) for name, (missed, differ) in unknown.items()}
     return SearchSettings(

@@ -50,7 +50,7 @@ def detectable(
 
     Notes
     -----
-    The session is simulated with white noise of the sensors and nothing hidden in it, calibrated, and every candidate is asked to first
+    The session is simulated with white noise of the sensors and nothing hidden in it, calibrated, and every candidate is tested to first
     order, as on measured data. Tone, slips and whatever else differs between trials of a living arm make the limits larger.
     """
     checks.instance("model", model, Model)

@@ -232,7 +232,7 @@ def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:
 
 
 _SUSPECTS = 12
-"""Effects that are drawn of a first look."""
+"""Effects that are drawn of a screening."""
 
 
 def first_look(suspects: Sequence[Suspect], joints: Sequence[str]) -> Drawn:

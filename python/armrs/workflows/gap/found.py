@@ -107,7 +107,7 @@ class GapFound(Tabular, Series):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader should know of the data."""
+        """Remarks on the data."""
         return self.result.warnings
 
     @cached_property

@@ -12,7 +12,7 @@ from ...report.tables import digits, read_in, with_interval, with_unit
 OPEN = 1.5
 """A channel is open as a whole where its gap exceeds so many times its floor."""
 _AS_REPEATS = 1.1
-"""A channel whose gap exceeds its floor by a tenth at most is off by what repeats differ by; a wider one is told with its factor."""
+"""A channel whose gap exceeds its floor by a tenth at most is within the scatter of repeats; a wider one is stated with its factor."""
 _FAMILIES = {
     "dry": "dry friction",
     "rate": "damping",
@@ -79,7 +79,7 @@ def left(channel: Mapping[str, Any]) -> float | None:
 def still_open(result: Mapping[str, Any]) -> list[str]:
     """Return the channels whose gap on the test trials the named effects leave open, the widest first.
 
-    What the result lists as `open` counts; a result without such a list is judged by `OPEN`.
+    What the result lists as `open` counts; for a result without such a list the limit is `OPEN`.
     """
     listed = result.get("open")
     if listed is None:
@@ -109,7 +109,7 @@ def only_near(result: Mapping[str, Any]) -> bool:
 
 
 def headline(result: Mapping[str, Any]) -> str:
-    """Return the answer in one sentence: what the model lacks, and what that does to the gap on the test trials."""
+    """Return the result in one sentence: what the model lacks, and the gap on the test trials before and after."""
     joints, effects = result["data"]["joints"], by_joint(result)
     opened, unexplained = still_open(result), result["verdict"] == "unexplained"
     tested = result["lack_of_fit"]["amended"]["z"] is not None
@@ -213,14 +213,14 @@ def _sized(effect: Mapping[str, Any], joints: Sequence[str]) -> str:
 
 
 def largest(parameters: Mapping[str, Mapping[str, Any]]) -> str | None:
-    """Return the name of the value that tells the size of an effect: of those fitted that have the unit of the first, the largest."""
+    """Return the name of the value that is the size of an effect: of those fitted that have the unit of the first, the largest."""
     fitted = {name: p for name, p in parameters.items() if p["std"] is not None}
     alike = [name for name, p in fitted.items() if p["unit"] == next(iter(fitted.values()))["unit"]]
     return max(alike, key=lambda name: abs(fitted[name]["value"]), default=None)
 
 
 def _gap(result: Mapping[str, Any], opened: Sequence[str]) -> str:
-    """Say what the gap of one channel does: of an open one where there is such, else of that which was widest."""
+    """Return a clause on the gap of one channel: of an open one if there is one, else of that with the widest gap."""
     gap = {name: g for name, g in result["gap"].items() if g["calibrated"]}
     shown = [name for name in opened if name in gap]
     name = shown[0] if shown else max(gap, key=lambda n: _times(gap[n], "calibrated"))
@@ -274,7 +274,7 @@ def spoken(name: str) -> str:
 
 
 def place(result: Mapping[str, Any], name: str) -> str:
-    """Return where the gap of an open channel is widest, if the result says that: ` (widest in trials/fast_2.csv, 3.1 to 4.6 s)`."""
+    """Return where the gap of an open channel is widest, if the result states that: ` (widest in trials/fast_2.csv, 3.1 to 4.6 s)`."""
     entry = next((o for o in result.get("open") or [] if o["channel"] == name), None)
     if entry is None or not entry.get("trial"):
         return ""

@@ -17,7 +17,7 @@ from ...io.trial import Trial
 _MOVING = 0.1
 """Share of a joint's fastest speed in a trial below which it counts as resting."""
 _FEWEST = 16
-"""Samples below which a region says nothing."""
+"""Fewest samples of a region that is compared."""
 _SEEN = 3
 """Samples of one trial below which a cell of a map was not visited."""
 
@@ -164,13 +164,13 @@ def residual_map(found: Sequence[Discrepancy], joint: int, cells: tuple[int, int
 
 
 _CLEAR = 0.15
-"""Share of the square of what is left that a dependence must describe to be said."""
+"""Share of the square of the residual that a dependence must describe to be stated."""
 _ALONE = 4.0
 """How much more than the middle one a trial must hold of what is left to be the only one."""
 
 
 def shape(found: Sequence[Discrepancy]) -> str | None:
-    """Say in words what is left looks like: in which joint, and on what it depends; None where there is nothing to look at.
+    """Describe the residual in words: in which joint it is, and on what it depends; None where there is none.
 
     Shares are of the mean square of the torque that is left in the fit trials, less its mean.
     """

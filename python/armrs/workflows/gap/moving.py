@@ -20,7 +20,7 @@ from .shapes import telling_trial
 
 
 def moving(result: GapFound) -> Live:
-    """Return what moves in the page: the telling test trial, measured and simulated, and what it would be without each named effect."""
+    """Return the animation of the page: the most informative test trial, measured and simulated, also without each named effect."""
     if not is_led(result.dataset):
         return NOTHING
     shown = telling_trial(result)

@@ -36,7 +36,7 @@ def find_gap(
     effects : sequence of OwnEffect
         User-defined kinds (`armrs.own_effect`) that are tested besides the catalogue.
     separate : bool
-        Whether to look for movements that would distinguish a named effect from its alternatives.
+        Whether to search for movements that would distinguish a named effect from its alternatives.
     threads : int, optional
         All cores when absent; the result does not depend on it.
     progress : callable, optional
@@ -56,7 +56,7 @@ def find_gap(
     Notes
     -----
     Where the simulated arm does not follow the measured one at all, as a free wrist may, joint torques in measured motion are compared
-    instead; the first of the warnings says so.
+    instead; the first of the warnings states that.
 
     Examples
     --------

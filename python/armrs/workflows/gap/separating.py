@@ -1,4 +1,4 @@
-"""Movements that would tell an effect from those that explain the data as well."""
+"""Movements that would distinguish an effect from those that explain the data as well."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BEYOND = 0.15
 LARGEST = 0.7
 """Largest amplitude of a movement [rad]."""
 STRONGER = 2.0
-"""How many times the largest measured force a movement may ask for."""
+"""Largest force of a movement, relative to the largest measured one."""
 FASTER = 1.5
 """How many times the largest measured joint speed."""
 
@@ -39,7 +39,7 @@ class Candidate:
 
 
 def separate(result: GapFound, *, threads: int | None = None, progress: Callable[[str, float], None] | None = None) -> GapFound:
-    """Propose for every alternative the movement that would tell it best from the named effect.
+    """Propose for every alternative the movement that distinguishes it best from the named effect.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _patterns(names: Sequence[str]) -> list[tuple[np.ndarray, str]]:
 
 
 def _ends(names: Sequence[str], pattern: np.ndarray, *points: np.ndarray) -> str:
-    """Say through which angles the joints go."""
+    """Describe the angles of the joints."""
     moved = [j for j in range(len(names)) if pattern[j]]
     return "; ".join(f"{names[j]} {', '.join(f'{np.degrees(p[j]):.0f}°' for p in (*points, points[0]))}" for j in moved)
 

@@ -91,7 +91,7 @@ def _own(result: GapFound, effect: Missing) -> Effect:
 
 
 def _values(effect: Missing, values: dict[str, float]) -> dict[str, float]:
-    """Return values within the bounds of the kind, and without what only a report says, such as the start of a sensor's slip."""
+    """Return values within the bounds of the kind, and without those for reports only, such as the start of a sensor's slip."""
     known = {p.name: p for p in catalogue()[effect.kind].parameters}
     return {n: min(max(v, known[n].min), known[n].max) for n, v in values.items() if n in known}
 
@@ -176,7 +176,7 @@ def _described(columns: list[np.ndarray], values: list[np.ndarray]) -> float:
 def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.ndarray, np.ndarray | None]:
     """Return what the effect changes in one trial: that in which it was, else the test trial in which it changes most.
 
-    Without test trials, it is the fit trial that tells most.
+    Without test trials, it is the most informative fit trial.
     """
     data, led = result.dataset, is_led(result.dataset)
     if effect.trial is None:
@@ -195,5 +195,5 @@ def _changed(result: GapFound, effect: Missing, own: Effect) -> tuple[str, np.nd
     trial = data.trials[shown]
     t, rows = trial.t - trial.t[0], changed.get(shown)
     if rows is not None and effect.span is not None and "sensor" in catalogue()[effect.kind].where:
-        rows = np.where(((t >= effect.span[0]) & (t <= effect.span[1]))[:, None], rows, 0.0)  # a sensor forgets
+        rows = np.where(((t >= effect.span[0]) & (t <= effect.span[1]))[:, None], rows, 0.0)  # an error of a sensor has no after-effect
     return trial.file, t, rows

@@ -39,7 +39,7 @@ class Compared:
     discrepancies : tuple of Discrepancy
         The torque that the model lacks at every sample of every trial.
     warnings : tuple of str
-        What a reader should know of the data.
+        Remarks on the data.
     """
 
     gap: Mapping[str, float]
@@ -58,7 +58,7 @@ class Compared:
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """A model after everything was refitted that was never exact, and a first look at what it lacks.
+    """A model after calibration, and a screening for effects that it lacks.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Calibrated:
     lack : (float, float)
         Lack of fit, ratio and z; NaN without repeats.
     suspects : tuple of Suspect
-        Every effect that was asked, alone and to first order, the likeliest first. One that gains more than its price may be there;
+        Every effect that was tested, alone and to first order, the likeliest first. One that gains more than its price may be there;
         nothing was converged, and several of them may be one.
     """
 
@@ -102,7 +102,7 @@ class Calibrated:
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Every effect that was asked, alone and to first order, the likeliest first."""
+        """Every effect that was tested, alone and to first order, the likeliest first."""
         return self.result.suspects
 
     def plot(self) -> np.ndarray:
@@ -134,7 +134,7 @@ def compare(dataset: Source, model: Model | None = None) -> Compared:
     Raises
     ------
     BadInput
-        For data that cannot be judged, as `find_gap`.
+        For insufficient data, as `find_gap`.
     """
     data = _loaded(dataset, model)
     led = is_led(data)
@@ -153,7 +153,7 @@ def calibrate(
     threads: int | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Calibrated:
-    """Refit what was never exact, and look which effects would explain the rest: a first answer, in seconds.
+    """Calibrate the model, and test to first order which effects would explain the residual: a first result, in seconds.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def calibrate(
     Raises
     ------
     BadInput
-        For data that cannot be judged.
+        For insufficient data.
     SimulationError
         When the model as given cannot be simulated on a trial.
     """
@@ -193,7 +193,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> Mapping[str, Cha
     Returns
     -------
     mapping of str to ChannelGap
-        By channel; `floor` is that of the result, and `open` says where these trials exceed what their own repeats differ by.
+        By channel; `floor` is that of the result, and `open` states where these trials exceed the scatter of their own repeats.
     """
     data = result.dataset if dataset is None else _loaded(dataset, result.dataset.model)
     led = is_led(data)

@@ -1,4 +1,4 @@
-"""What is wrong with a data set before any physics is asked: labels, units, signs, channels that say nothing."""
+"""What is wrong with a data set before any fit: labels, units, signs, channels without information."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BY_TORQUES = "so all trials are compared by joint torques in measured motion"
 _NOT_TOLD = "The contact, the robot, a first joint that moves, tremor and bursts cannot be tested that way"
 _NO_FORCES = "nor can errors of the force sensor, its misalignment and its delay"
 _APART = 0.01
-"""Mean distance of hand and handle from which on it is told [m]: ten times the default placement of the handle."""
+"""Mean distance of hand and handle from which on it is reported [m]: ten times the default placement of the handle."""
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
 _NEAR = 0.02
@@ -31,15 +31,15 @@ _OFTEN = 3.0
 _ALIKE = 0.9
 """Correlation above which two signals are the same movement."""
 _STARTING = 0.02
-"""Time between the samples that tell how fast the robot is when a trial begins [s]."""
+"""Time between the samples from which the speed of the robot at the start of a trial is computed [s]."""
 _AT_REST = 0.05
-"""Speed of a robot's joint up to which it counts as resting [rad/s]: four samples of an encoder of 0.1 mrad tell it to 0.02."""
+"""Speed of a robot's joint up to which it counts as resting [rad/s]: four samples of an encoder of 0.1 mrad give it to 0.02."""
 _FIRST = 16
-"""Samples at the start by which trials that may be copies are looked up: no trial has fewer."""
+"""Samples at the start that are compared first to find copies: no trial has fewer."""
 
 
 def examine(dataset: Dataset, led: bool) -> list[str]:
-    """Return what a reader of the result should know beforehand, a line each.
+    """Return remarks on the data for a reader of the result, a line each.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def _wrong_setup(dataset: Dataset, led: bool) -> list[str]:
 def _apart(dataset: Dataset, led: bool) -> list[str]:
     """Return that hand and handle are apart on average: a base or a length is wrong by centimetres, which would be named as an effect.
 
-    A soft contact gives way by millimetres.
+    A soft contact deflects by millimetres.
     """
     gap = mean_gap(dataset)
     if gap is None or float(np.hypot(*gap)) < _APART:
@@ -102,7 +102,7 @@ def _other_weight(dataset: Dataset, led: bool) -> list[str]:
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
-    """Return which trials keep the others from being compared in the closed chain, and what is not asked for it."""
+    """Return which trials prevent a comparison in the closed chain, and what is not tested because of them."""
     if led or not any(t.force_on_arm is not None for t in dataset.trials):
         return []
     forces = ", ".join(t.file for t in dataset.trials if t.force_on_arm is None)
@@ -132,7 +132,7 @@ def _still_joints(dataset: Dataset, led: bool) -> list[str]:
 
 
 def _copies(dataset: Dataset, led: bool) -> list[str]:
-    """Refuse a trial whose samples are those of another, or of its start: such repeats tell no noise, and such a test proves nothing."""
+    """Refuse a trial whose samples are those of another, or of its start: such repeats show no noise, and such a test is none."""
     known: dict[bytes, list[Trial]] = {}
     for trial in dataset.trials:
         # Comparing those alone that start alike is cheap for many trials and long ones.

@@ -17,7 +17,7 @@ from .headline import effect_name, joined
 verdict = headline.headline
 """The result in one sentence."""
 _TELLS = 5.0
-"""Standard deviations from which on a movement tells two effects apart."""
+"""Standard deviations from which on a movement distinguishes two effects."""
 _BETTER = 10.0
 """Units of twice the log-likelihood from which an alternative explains more or less, and not just as much."""
 
@@ -47,7 +47,7 @@ def named(result: Mapping[str, Any]) -> list[str]:
 
 
 def is_led(result: Mapping[str, Any]) -> bool:
-    """Tell whether a robot led the arm: the gap is in contact forces."""
+    """Return whether a robot led the arm: the gap is in contact forces."""
     return any(name.endswith("_N") for name in result["gap"])
 
 
@@ -58,7 +58,7 @@ FORMULAS = (
 
 
 def symbols(result: Mapping[str, Any]) -> str:
-    """Return a sentence that says what the names of the channels mean."""
+    """Return a sentence that explains the names of the channels."""
     names: dict[str, list[int]] = {}
     measured = [channel for channel, g in result["gap"].items() if g["before"] is not None]
     for channel in measured or result["gap"]:
@@ -85,13 +85,13 @@ _UNTESTED = "Without repeats of a movement, it cannot be tested whether the rema
 
 
 def others(result: Mapping[str, Any]) -> list[str]:
-    """Return what may be there instead, a line for each effect that has alternatives, and what would tell."""
+    """Return alternatives, a line for each effect that has some, and movements that would distinguish them."""
     lines = []
     for effect in result["effects"]:
         listed = [f"{effect_name(a)} ({_how(a)})" for a in effect["alternatives"]]
         if listed:
             lines.append(f"Instead of {effect_name(effect)} it may be {joined(listed, 'or')}.")
-        # What several are told by stands once.
+        # A movement that distinguishes several stands once.
         told: dict[str, list[str]] = {}
         for a in effect["alternatives"]:
             told.setdefault(_separating(a), []).append(effect_name(a))
@@ -100,7 +100,7 @@ def others(result: Mapping[str, Any]) -> list[str]:
 
 
 def tie(result: Mapping[str, Any]) -> str:
-    """Return by how much alternatives may explain the data less and still not be told apart."""
+    """Return by how much alternatives may explain the data less and still not be distinguished."""
     worse = [a.get("worse") or 0.0 for effect in result["effects"] for a in effect["alternatives"]]
     beyond = ", or by no more than the possible error of the named law" if max(worse, default=0.0) > _BETTER else ""
     rare = " One that explains them better is not named, because few joints have it." if min(worse, default=0.0) < -_BETTER else ""
@@ -111,7 +111,7 @@ def tie(result: Mapping[str, Any]) -> str:
 
 
 def _separating(alternative: Mapping[str, Any]) -> str:
-    """Say which movement would tell, and how well; nothing where none was looked for."""
+    """Return which movement would distinguish them, and how well; nothing where none was searched for."""
     separation = alternative.get("separation")
     if separation is None:
         return ""
@@ -173,7 +173,7 @@ def left(result: Mapping[str, Any]) -> list[str]:
 
 
 def _deviations(z: float) -> str:
-    """Write how many standard deviations something is off: beyond a hundred the number says nothing."""
+    """Write a number of standard deviations, without digits beyond a hundred."""
     return "more than 100" if z > 100.0 else f"{round(z, 1) + 0.0:+.1f}"
 
 
@@ -195,7 +195,7 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
 
 
 def quick(result: Mapping[str, Any]) -> None:
-    """Print a first look."""
+    """Print a screening."""
     label = " (synthetic data)" if common.is_synthetic(result) else ""
     worth = [s for s in result["suspects"] if s["gain"] > s["price"]]
     z = result["lack_of_fit"]["calibrated"]["z"]
@@ -268,7 +268,7 @@ def intervals(data: Mapping[str, Any]) -> str:
 
 
 def worth(data: Mapping[str, Any]) -> str:
-    """Return what the third column of `missing` says."""
+    """Return the third column of `missing`."""
     if all(effect.get("without") is None for effect in data["effects"]):
         return "Share: the part of all that is explained which would be lost if this one effect were left out and everything else refitted."
     with_all = data["lack_of_fit"]["amended"]["ratio"] ** 0.5
@@ -281,7 +281,7 @@ def worth(data: Mapping[str, Any]) -> str:
 def gap(data: Mapping[str, Any]) -> Table:
     """Return the gap of every channel: as given, calibrated, with the named effects, and the floor.
 
-    Where nothing was named, the calibrated model is that of the last fit, by which verdict and headline judge.
+    Where nothing was named, the calibrated model is that of the last fit, as in verdict and headline.
     """
     named = any(not e.get("trial") for e in data["effects"])
     opened = headline.still_open(data)
@@ -337,7 +337,7 @@ def nearest(data: Mapping[str, Any], most: int = 8) -> Table:
 
 
 def calibration(data: Mapping[str, Any]) -> Table:
-    """Return what the calibration absorbed, beside what was promised."""
+    """Return what the calibration absorbed, beside its tolerance."""
     rows = []
     for a in data["calibration"]:
         factor, held_in = tables.read_in(a["unit"])

@@ -16,7 +16,7 @@ from .reads import Read, angles_of, arrays, by, forces_of, values
 from .recipe import Channel, Convention, RawTrial
 
 _LIKELY = 6
-"""Conventions in which clocks are looked for at most."""
+"""Most conventions in which clocks are aligned."""
 _CLEAR = 0.05
 """With less than this unexplained, clocks and convention are right [share of the contact torques]."""
 
@@ -74,7 +74,7 @@ def _recording(read: Read, channels: Sequence[Channel], convention: Convention) 
 def settled(
     reads: Sequence[Read], channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
 ) -> tuple[list[Read], Convention, list[str], list[str]]:
-    """Return trials on the clock of their angles, the convention in which the arm balances, what is said of clocks; what is in doubt."""
+    """Return trials on the clock of their angles, the convention in which the arm balances, remarks on clocks; doubts."""
     lines, doubts = list[str](), list[str]()
     apart = [k for k, read in enumerate(reads) if read.forces is not None]
     if apart and not problems:
@@ -108,7 +108,7 @@ def _matched(
 def _refined(
     reads: Sequence[Read], channels: Sequence[Channel], convention: Convention, model: Model
 ) -> tuple[list[Read], list[str], list[str]]:
-    """Return trials with their forces on the clock of the angles, by the equation of motion; what is said of it; what is in doubt."""
+    """Return trials with their forces on the clock of the angles, by the equation of motion; remarks on it; doubts."""
     apart = [k for k, read in enumerate(reads) if read.forces is not None]
     recordings = [_recording(reads[k], channels, convention) for k in apart]
     found = dict(zip(apart, clock.certain(model, recordings, clock.refine(model, recordings)), strict=True))

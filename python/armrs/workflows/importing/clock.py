@@ -17,7 +17,7 @@ _RATE = 50.0
 _COARSE = 0.04
 """First steps of the lateness [s]."""
 NEAR = 0.35
-"""The posture alone tells the shift to this [s]; within it the equation of motion is asked."""
+"""Accuracy of the shift from the posture alone [s]; within it the equation of motion is used."""
 _STEP, _LONGEST, _SETTLED, _ROUNDS = 0.01, 0.05, 1e-5, 40
 """Steps of the shift [s]: over which slopes are taken, the longest in one round, and the one that ends the rounds."""
 _TOGETHER = 1.5
@@ -33,7 +33,7 @@ _COMPARED = 0.25
 _CREEP = 0.02
 """Speed at which friction has most of its size [rad/s]."""
 _LATEST = 0.6
-"""Lateness up to which forces are looked for [s]."""
+"""Largest lateness of forces that is tried [s]."""
 _AS_GOOD = 1.2
 """The clock of the file is kept where it leaves at most so many times what the best shift does."""
 
@@ -109,7 +109,7 @@ def refine(model: Model, recordings: Sequence[Recording]) -> list[float]:
 
     Notes
     -----
-    In one slow movement, a delay and a viscosity look alike. All recordings share the laws of the joints; and one shift holds for all,
+    In one slow movement, a delay resembles a viscosity. All recordings share the laws of the joints; and one shift holds for all,
     as where one trigger starts both devices, if that explains the torques about as well. Where both seem to be on one clock, they are
     if that explains the torques about as well. A movement that repeats itself may have been taken a period off; so the shift of every
     recording is tried for all. Shifts are compared on the samples that have forces at both: what a longer shift leaves out, such as a
@@ -145,8 +145,8 @@ class Found:
     seconds : float
         Added to the time of the forces [s].
     std : float
-        Its standard deviation [s], of residuals that are independent from second to second; infinite where a delay and the laws of the
-        joints look alike.
+        Its standard deviation [s], of residuals that are independent from second to second; infinite where a delay cannot be distinguished
+        from the laws of the joints.
     others : tuple of float
         Other shifts that explain the torques about as well [s].
     """
@@ -245,7 +245,7 @@ def _deviations(fits: Sequence[_Fit], shifts: np.ndarray, *, together: bool) -> 
     design = design[:, np.abs(design).max(axis=0) > 0.0]
     design = design / np.abs(design).max(axis=0)
     torque = np.concatenate([fit.torque(float(s)) for fit, s in zip(fits, shifts, strict=True)])
-    # What the laws of the joints do not take up tells the shift.
+    # The shift follows from the part that the laws of the joints do not explain.
     own = columns - design @ np.linalg.lstsq(design, columns, rcond=1e-10)[0]
     left = torque - design @ np.linalg.lstsq(design, torque, rcond=1e-10)[0]
     information = own.T @ own
@@ -274,7 +274,7 @@ def _distinct(shifts: Sequence[float]) -> list[float]:
 
 @dataclass(frozen=True)
 class _Fit:
-    """What the equation of motion asks of one recording: `design` times unknowns is the torque of the contact force."""
+    """The equation of motion of one recording: `design` times unknowns is the torque of the contact force."""
 
     grid: np.ndarray
     design: np.ndarray
@@ -339,7 +339,7 @@ def matched(model: Model, recordings: Sequence[Recording]) -> list[list[float]]:
 
 
 def _fits(model: Model, recordings: Sequence[Recording], *hypotheses: np.ndarray) -> list[_Fit]:
-    """Return what the equation of motion asks of samples with forces at the shifts of all hypotheses; nothing where these are few."""
+    """Return the equation of motion of samples with forces at the shifts of all hypotheses; nothing where these are few."""
     fits = [_Fit.of(model, r, shifts, NEAR + _STEP) for r, shifts in zip(recordings, np.column_stack(hypotheses).tolist(), strict=True)]
     enough = all(len(fit.grid) >= _COMPARED * (r.t[-1] - r.t[0]) * _RATE for fit, r in zip(fits, recordings, strict=True))
     return fits if enough or len(hypotheses) == 1 else []

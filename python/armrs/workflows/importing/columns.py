@@ -109,7 +109,7 @@ def _mentions(tokens: Sequence[str], names: set[str]) -> bool:
 
 
 def symbol_of(column: RawColumn) -> str | None:
-    """Return the symbol that a column's name and unit say, or None.
+    """Return the symbol of a column by its name and unit, or None.
 
     >>> import numpy as np
     >>> from armrs.io.raw.table import column
@@ -204,7 +204,7 @@ def guess(tables: Sequence[RawTable], given: Mapping[str, tuple[str, int]], prob
     Parameters
     ----------
     tables : sequence of RawTable
-        The first one's columns are looked at; units that are not stated are read off the values of all.
+        The columns of the first one are used; units that are not stated are inferred from the values of all.
     given : mapping of symbol to (column, sign)
         From `parse_map`; these are taken as they are.
     problems : list of BadInput

@@ -101,11 +101,11 @@ def decide(
     Parameters
     ----------
     model : Model
-        Lengths, and masses as far as the literature knows them.
+        Lengths, and masses from the literature.
     recordings : sequence of (t, q, force)
         Time [s], raw angles (n, n_joints) [rad] and raw force (n, 2) [N] of each trial.
     given : mapping
-        What the caller states; see `candidates`.
+        Settings of the caller; see `candidates`.
     problems : list of BadInput
         Gets a refusal where several conventions balance the arm equally well, or none does.
     doubts : list of str

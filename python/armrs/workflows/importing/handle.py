@@ -20,7 +20,7 @@ _STIFFNESS = 10_000.0
 _SLIPPED = 2.0
 """A trial that leaves so many times what the middle one does is not used."""
 _TOLD = 1e-3
-"""Smallest singular value, relative to the largest, with which movements tell lengths and base of a robot."""
+"""Smallest singular value, relative to the largest, with which movements determine lengths and base of a robot."""
 
 
 def origin(model: Model, trials: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
@@ -131,7 +131,7 @@ def _handle_system(hand: np.ndarray, qr: np.ndarray) -> np.ndarray:
 
 
 def _solved(systems: Sequence[np.ndarray]) -> tuple[np.ndarray, int, np.ndarray]:
-    """Return the least squares of all trials, how many numbers are told, and the distance (root mean square) left in each trial [m]."""
+    """Return the least squares of all trials, the number of determined parameters, and the distance (RMS) left in each trial [m]."""
     rows = np.concatenate(systems)
     found, _, rank, _ = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=_TOLD)
     left = [np.sqrt(2.0 * np.mean((s[:, :-1] @ found - s[:, -1]) ** 2)) for s in systems]

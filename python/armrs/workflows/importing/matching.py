@@ -1,6 +1,6 @@
 """Which offset of a force recording's clock makes its forces belong to the movement, for all recordings of a session together.
 
-Only the posture is asked, whatever the convention of the angles: forces are regressed on sines and cosines of the sums of neighbouring
+Only the posture is used, whatever the convention of the angles: forces are regressed on sines and cosines of the sums of neighbouring
 angles, which gravity of a moving arm consists of, on their second derivatives, which its inertia consists of, and on speeds.
 """
 
@@ -32,11 +32,11 @@ _MOST = 6
 _EXPLAINED = 0.6
 """Least share of the force's variance that the movement must explain: less is no match."""
 _ROUNDS = 6
-"""Rounds in which the offset of each recording is looked for beside those of the others."""
+"""Rounds in which the offset of each recording is searched for beside those of the others."""
 _STARTS, _APART = 4, 0.35
 """Recordings that the search begins with, the clearest ones: of which offsets so far [s] from the best are the worst."""
 _RIDGE = 1e-9
-"""Regressors that are not told apart share what they explain; relative to their size."""
+"""Regressors that cannot be distinguished share what they explain; relative to their size."""
 AVERAGED = 0.1
 """Angles and forces are averaged over this before angles are differentiated [s]."""
 _SMOOTHED, _TIMES = 0.12, 3

@@ -37,7 +37,7 @@ class Question:
 
 
 def questions(paths: Sequence[Path], points: tuple[str, ...], joints: Sequence[str]) -> tuple[RawTable, list[Question]]:
-    """Return the first recording that has columns, and what is to be asked about them.
+    """Return the first recording that has columns, and the questions about them.
 
     Raises
     ------

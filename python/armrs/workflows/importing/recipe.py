@@ -100,7 +100,7 @@ class RawTrial:
     force_table : str, optional
         Title of the table of forces in it; the first when absent.
     remarks : tuple of str
-        What columns of words say, with the time; for readers, an import takes them from the raw file again.
+        Text of columns of words, with the time; for readers, an import takes them from the raw file again.
     """
 
     file: str

@@ -1,4 +1,4 @@
-"""What an import tells of its files: what their readers decided, and the remarks that somebody wrote beside the samples."""
+"""Remarks of an import on its files: decisions of the readers, and remarks that were recorded with the samples."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MOST_KEPT = 200
 
 
 def said(tables: Sequence[RawTable]) -> list[str]:
-    """Return what is to be said of tables, each line once, with the file where it does not hold for all."""
+    """Return the remarks on tables, each line once, with the file where it does not hold for all."""
     by_note: dict[str, list[RawTable]] = {}
     for table in tables:
         for note in (*table.notes, *_columns_of_words(table)):
@@ -28,7 +28,7 @@ def said(tables: Sequence[RawTable]) -> list[str]:
 
 
 def _columns_of_words(table: RawTable) -> Iterator[str]:
-    """Give a line for each column of words: what it says, each remark once with the sample of its first."""
+    """Give a line for each column of words: its text, each remark once with its first sample."""
     for name in dict.fromkeys(remark.column for remark in table.remarks):
         first = {r.text: r.row + 1 for r in reversed(table.remarks) if r.column == name}
         shown = [f"{text!r} in sample {sample}" for text, sample in sorted(first.items(), key=lambda item: item[1])]

@@ -1,4 +1,4 @@
-"""Own recordings into a data set: read, guess what is what, decide conventions, write; every decision is kept in `import.toml`."""
+"""Own recordings into a data set: read, identify columns, decide conventions, write; every decision is kept in `import.toml`."""
 
 from __future__ import annotations
 
@@ -107,12 +107,12 @@ def import_recordings(
         `dataset.toml` beside it are kept. Only an `import.toml` needs none: then it is the `model.toml` beside that.
         A model without a robot gets the one that the recorded angles of a robot show (`handle.robot_of`), where they do.
     columns_map : str
-        `t=COLUMN,q1=COLUMN,Fy=-COLUMN,…` for columns whose names do not say what they are; a minus turns the sign.
+        `t=COLUMN,q1=COLUMN,Fy=-COLUMN,…` for columns whose names do not show what they are; a minus turns the sign.
     angles : {"relative", "absolute"}, optional
     zero : {"horizontal", "hanging"}, optional
         Direction of the first segment at zero.
     clockwise : sequence of int, optional
-        Joints whose angle is clockwise positive; an empty one says that none is.
+        Joints whose angle is clockwise positive; an empty one states that none is.
     force_on : {"robot", "arm"}, optional
         What the recorded force acts on.
         The four above are read off the data where they are not given.
@@ -184,7 +184,7 @@ def _about(model: Path) -> tuple[Subject, Tolerance]:
 
 
 def _led(model: Model, recipe: Recipe, reads: Sequence[Read]) -> tuple[Model, list[str]]:
-    """Return a model with the robot that the recorded angles show, where it has none, and what is to be said of that."""
+    """Return a model with the robot that the recorded angles show, where it has none, and remarks on that."""
     channels = recipe.channels
     if model.robot is not None or not {"qr1", "qr2"} <= {c.symbol for c in channels}:
         return model, []
@@ -228,7 +228,7 @@ def _decided(
     rate: float | None,
     tell: Callable[[str, float], None],
 ) -> tuple[Recipe, list[Read], list[str], list[str]]:
-    """Return what all files say together; every problem is collected before any is raised."""
+    """Return the contents of all files; every problem is collected before any is raised."""
     problems: list[BadInput] = []
     sought = 0 if any(symbol.startswith("q") for symbol in mapped) else model.n_joints
     sources = raw.read_all(paths, points, sought, problems, lambda stage, share: tell(stage, _READ * share))
@@ -257,7 +257,7 @@ def _decided(
     named, projected = _in_plane(named, mapped)
     if all(n.table.plane is not None for n in named):
         given = {**given, conventions.OF_MARKERS: True}
-    of_files = len(problems)  # that whole files are left out keeps no other file from being judged
+    of_files = len(problems)  # files that are left out as a whole do not prevent the check of others
     channels = columns.guess([n.table for n in named], _present(mapped, named[0].table), problems)
     force_tables = [n.forces for n in named if n.forces is not None]
     if force_tables:
@@ -296,11 +296,11 @@ def _decided(
 
 
 def _in_plane(named: Sequence[trials.Named], mapped: Mapping[str, object]) -> tuple[list[trials.Named], list[str]]:
-    """Return trials with the forces of other files in the plane that their markers show, and what is said of it; mapped forces stay."""
+    """Return trials with the forces of other files in the plane that their markers show, and remarks on it; mapped forces stay."""
     if any(symbol.startswith("F") for symbol in mapped):
         return list(named), []
     found = [n if n.forces is None else changed(n, forces=raw.in_plane(n.forces, n.table)) for n in named]
-    # What their reader said of them is said with all tables.
+    # Remarks of their reader are given with all tables.
     told = [
         changed(after.forces, notes=after.forces.notes[len(before.forces.notes) :], remarks=())
         for before, after in zip(named, found, strict=True)

@@ -34,7 +34,7 @@ class Sources:
     notes : list of str
         What was left out, and why.
     points : tuple of str
-        Markers of the joints: those that were named, or a guess from the names in the first file with markers.
+        Markers of the joints: those that were named, or inferred from the names in the first file with markers.
     """
 
     tables: list[RawTable] = field(default_factory=list)
@@ -173,7 +173,7 @@ def in_plane(forces: RawTable, angles: RawTable) -> RawTable:
 
 
 def _projected(own: Sequence[RawColumn], plane: np.ndarray) -> tuple[list[RawColumn], list[str]]:
-    """Return columns with a force of three components in the plane, and a moment about its normal; what is said of that.
+    """Return columns with a force of three components in the plane, and a moment about its normal; remarks on that.
 
     `plane` are the directions forward and up, (2, 3), in the axes of force and moment.
     """

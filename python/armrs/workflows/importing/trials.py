@@ -78,7 +78,7 @@ def _has(table: RawTable, start: str) -> bool:
 
 
 def _titles(tables: Sequence[RawTable]) -> list[str]:
-    """Return the titles, those of the sheets of a workbook without its name where they are told apart without it."""
+    """Return the titles, those of the sheets of a workbook without its name where they are unique without it."""
     files = [t.path for t in tables]
     bare = [t.title.removeprefix(t.path.stem).strip() or t.title if files.count(t.path) > 1 else t.title for t in tables]
     return bare if len(set(bare)) == len(bare) else [t.title for t in tables]
@@ -95,7 +95,7 @@ def _names(titles: Sequence[str]) -> list[str]:
 
 
 def _lettered(parts: Sequence[str]) -> bool:
-    """Whether words say more than a number."""
+    """Whether words are more than a number."""
     return any(character.isalpha() for part in parts for character in part)
 
 

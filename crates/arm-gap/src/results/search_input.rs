@@ -9,9 +9,9 @@ pub struct TrialFile {
     pub end: f64,
 }
 
-/// What a search was asked about, as the files have it.
+/// The input of a search, in the terms of the files.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct SearchInput<'a> {
     /// The model as given.
     pub model: &'a Model,
     /// Whether the forces in the files are on the robot.
