@@ -2,6 +2,7 @@ use arm_core::effect::Kind;
 use arm_model::{Effect, Model};
 use serde::Serialize;
 
+use super::effect::sign_in_files;
 use super::placed;
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 
@@ -22,27 +23,29 @@ pub struct Absorbed {
 const RELATIVE: &str = "of its value";
 
 /// What was refitted of a model, from the unknowns of its fit.
+///
+/// * `model` - the model as given, and whether the forces in the files act on the robot
 pub(super) fn absorbed<'c, const N: usize>(
-    model: &Model,
+    model: (&Model, bool),
     hypothesis: &Hypothesis<N>,
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Vec<Absorbed> {
-    let modelled = model.all_effects();
-    let each = unknowns.filter_map(|c| absorbed_value(&modelled, hypothesis, c));
+    let modelled = (&model.0.all_effects()[..], model.1);
+    let each = unknowns.filter_map(|c| absorbed_value(modelled, hypothesis, c));
     each.collect()
 }
 
 /// A warning of what was refitted as far as it may be, beyond what was promised of it: what it could not take up may stand in what is
 /// named. `None` without any.
 pub(super) fn stopped<'c, const N: usize>(
-    model: &Model,
+    model: (&Model, bool),
     hypothesis: &Hypothesis<N>,
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Option<String> {
-    let modelled = model.all_effects();
+    let modelled = (&model.0.all_effects()[..], model.1);
     let far = unknowns.filter(|c| c.is_at_limit(hypothesis.get(c.target)));
     let words: Vec<String> = far
-        .filter_map(|c| absorbed_value(&modelled, hypothesis, c))
+        .filter_map(|c| absorbed_value(modelled, hypothesis, c))
         .filter(|a| a.value.abs() > a.promised)
         .map(|a| {
             let (value, promised) = (in_unit(a.value, &a.unit), in_unit(a.promised, &a.unit));
@@ -62,13 +65,23 @@ pub(super) fn stopped<'c, const N: usize>(
 fn in_unit(value: f64, unit: &str) -> String {
     match unit {
         RELATIVE => format!("{:.0} %", 100.0 * value),
-        _ => format!("{value:.1e} {unit}"),
+        _ => format!("{} {unit}", two_digits(value)),
     }
+}
+
+/// A value to two digits, without an exponent from a thousandth to a thousand.
+fn two_digits(value: f64) -> String {
+    let size = value.abs();
+    if !(1e-3..1e3).contains(&size) {
+        return format!("{value:.1e}");
+    }
+    let decimals = (1.0 - libm::floor(libm::log10(size))).max(0.0);
+    format!("{value:.*}", decimals as usize)
 }
 
 /// What was refitted of one unknown; `None` for what is each trial's own, or named.
 fn absorbed_value<const N: usize>(
-    modelled: &[Effect],
+    (modelled, force_on_robot): (&[Effect], bool),
     hypothesis: &Hypothesis<N>,
     unknown: &Coordinate,
 ) -> Option<Absorbed> {
@@ -103,6 +116,7 @@ fn absorbed_value<const N: usize>(
         Target::Calibration(e) => {
             let effect = &hypothesis.calibration[e];
             let unit = effect.kind.info().parameters[0].unit;
+            value *= sign_in_files(effect.kind, force_on_robot);
             (worded(effect.kind, effect.index), unit)
         }
         Target::Placement(_) | Target::Named(..) => return None,
@@ -163,7 +177,7 @@ mod tests {
             coordinate(Target::Known(1, 0), 1.0),
             coordinate(Target::Placement(0), 1.0),
         ];
-        let told = absorbed(&model, &hypothesis, unknowns.iter());
+        let told = absorbed((&model, false), &hypothesis, unknowns.iter());
         let names: Vec<_> = told.iter().map(|a| a.name.as_str()).collect();
         let expected = [
             "mass of segment 1",
@@ -177,17 +191,52 @@ mod tests {
         assert_eq!(told[2].unit, RELATIVE);
 
         // No value is at its limit; then the place of the robot is, and alone is reported.
-        assert_eq!(stopped(&model, &hypothesis, unknowns.iter()), None);
+        assert_eq!(stopped((&model, false), &hypothesis, unknowns.iter()), None);
         let mut bounded = unknowns;
         (bounded[0].upper, bounded[1].upper) = (0.02, 0.003);
         // At its limit, and yet within the tolerance.
-        assert_eq!(stopped(&model, &hypothesis, bounded.iter()), None);
+        assert_eq!(stopped((&model, false), &hypothesis, bounded.iter()), None);
         bounded[1].prior = Some((0.0, 0.001));
-        let told = stopped(&model, &hypothesis, bounded.iter()).expect("a warning");
+        let told = stopped((&model, false), &hypothesis, bounded.iter()).expect("a warning");
         assert!(
-            told.contains("place of the robot, z by 3.0e-3 m (prior ± 2.0e-3 m, 2 σ)."),
+            told.contains("place of the robot, z by 0.0030 m (prior ± 0.0020 m, 2 σ)."),
             "{told}"
         );
         assert!(!told.contains("mass"), "{told}");
+    }
+
+    #[test]
+    fn a_refitted_bias_has_the_sign_of_the_files() {
+        let model =
+            "[[arm.segment]]\nlength = 0.5\nmass = 2.0\ncom = 0.2\ninertia = 0.02\n[[arm.joint]]\n";
+        let model = Model::from_toml(model).expect("a model");
+        let hypothesis = Hypothesis::<1> {
+            segments: [[0.0; 3]],
+            contact: [[0.0; 2]; 2],
+            shift: [0.0; 2],
+            placement: [0.0; 2],
+            eccentricity: [[0.0; 2]],
+            known: Vec::new(),
+            calibration: vec![arm_core::effect::Effect::new(Kind::ForceBias, 1).with(&[0.3])],
+            named: Vec::new(),
+        };
+        let unknown = Coordinate {
+            target: Target::Calibration(0),
+            prior: Some((0.0, 0.1)),
+            lower: -1.0,
+            upper: 1.0,
+            step: 1e-3,
+        };
+        let bias = |on_robot| {
+            let told = absorbed((&model, on_robot), &hypothesis, [unknown].iter());
+            told[0].value
+        };
+        assert_eq!((bias(false), bias(true)), (0.3, -0.3));
+    }
+
+    #[test]
+    fn values_have_two_digits() {
+        let values = [0.8, 0.0123, 123.4, 1e-4, 0.0].map(two_digits);
+        assert_eq!(values, ["0.80", "0.012", "123", "1.0e-4", "0.0e0"]);
     }
 }

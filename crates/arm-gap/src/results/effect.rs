@@ -133,7 +133,7 @@ pub struct Missing {
 
 /// Sign of a linear parameter in the files: what adds to a force channel adds to the channel as it stands there, and not to the force on the
 /// arm; a gain has no unit and no sign.
-fn sign_in_files(kind: Kind, force_on_robot: bool) -> f64 {
+pub(super) fn sign_in_files(kind: Kind, force_on_robot: bool) -> f64 {
     let info = kind.info();
     let adds = info.place == ActsOn::ForceSensor && info.parameters[0].unit != "1";
     if adds && force_on_robot { -1.0 } else { 1.0 }

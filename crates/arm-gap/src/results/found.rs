@@ -127,7 +127,11 @@ impl GapResult {
             .collect();
         let amended = Fitted::of(&finding.amended.hypothesis);
         let unknowns = finding.precision.coordinates.iter();
-        let refitted_far = stopped(asked.model, &finding.amended.hypothesis, unknowns.clone());
+        let refitted_far = stopped(
+            (asked.model, asked.force_on_robot),
+            &finding.amended.hypothesis,
+            unknowns.clone(),
+        );
         Ok(Self {
             verdict,
             places: Vec::new(),
@@ -140,7 +144,11 @@ impl GapResult {
             },
             effects,
             looks_like: None,
-            absorbed: absorbed(asked.model, &finding.amended.hypothesis, unknowns),
+            absorbed: absorbed(
+                (asked.model, asked.force_on_robot),
+                &finding.amended.hypothesis,
+                unknowns,
+            ),
             lack: finding.lack.each_ref().map(Lack::from),
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
             warnings: held_in_motion(prepared.session)
@@ -285,7 +293,11 @@ impl Screening {
         let nuisances = prepared.session.nuisances();
         Ok(Self {
             model: Fitted::of(hypothesis).amended(asked.model, &[])?,
-            absorbed: absorbed(asked.model, hypothesis, nuisances.iter()),
+            absorbed: absorbed(
+                (asked.model, asked.force_on_robot),
+                hypothesis,
+                nuisances.iter(),
+            ),
             gap: channel_gaps(&trials, (N, led), Version::Calibrated),
             lack: Lack::from(&look.lack),
             suspects: look.suspects.iter().map(Suspect::of).collect(),

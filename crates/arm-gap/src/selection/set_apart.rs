@@ -8,6 +8,7 @@ use crate::GapError;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::prediction::Course;
+use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::search_state::{Progress, SearchState, Settled};
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -108,8 +109,39 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             }
             let again = self.calibrate_anew()?;
             state = self.search_from(again, apart.periodic, progress)?;
+            state = self.locked_set_apart_again(state, apart)?;
         }
         Ok(state)
+    }
+
+    /// Sets the only rhythm apart once more if it has one phase in all trials, as it is beside what was named: before that, its frequency and its
+    /// size were those of a model that lacked the rest.
+    fn locked_set_apart_again(
+        &mut self,
+        state: SearchState<'a, N>,
+        apart: &mut SetApart<N>,
+    ) -> Result<SearchState<'a, N>, GapError> {
+        let all = apart.trial_specific.iter_mut();
+        let mut rhythms = all.filter(|one| one.trial.is_none());
+        let (Some(only), None) = (rhythms.next(), rhythms.next()) else {
+            return Ok(state);
+        };
+        if !only.locked {
+            return Ok(state);
+        }
+        let without = std::mem::replace(&mut self.courses, apart.measured.clone());
+        let point = self.linearize(&state.point.hypothesis)?;
+        match self.swinging_near(only, &point)? {
+            Some(again) => {
+                self.take_out(&point, &again)?;
+                *only = again;
+                self.renewed(state)
+            }
+            None => {
+                self.courses = without;
+                Ok(state)
+            }
+        }
     }
 
     /// Sets one oscillation in phase apart; whether there is one. Only one slow oscillation is searched for.
@@ -183,12 +215,42 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             && let Some(one) = self.next_disturbance(&point, known)
             && let Some(trial) = one.trial
         {
+            let (one, trial) = self.in_the_likelier_repeat((one, trial), &fitted);
             self.leave_out(trial, one.span());
             trial_specific.push(one);
             self.measure_noise(&self.linearize(&point.hypothesis)?)?;
             (fitted, point) = self.settle(fitted.hypothesis, fitted.asked)?;
         }
         Ok((fitted, point))
+    }
+
+    /// A disturbance of one of two repeats, and the repeat without which the model fits all others better. Two repeats deviate alike, and a model
+    /// that was fitted to both may be as far from one as from the other.
+    fn in_the_likelier_repeat(
+        &self,
+        (one, trial): (TrialSpecific, usize),
+        fitted: &Fitted<N>,
+    ) -> (TrialSpecific, usize) {
+        let group = self.group_of[trial];
+        let repeats = self.fitted.iter().copied();
+        let repeats: Vec<usize> = repeats.filter(|&t| self.group_of[t] == group).collect();
+        let [first, second] = repeats[..] else {
+            return (one, trial);
+        };
+        let other = if first == trial { second } else { first };
+        let misfit_without = |left_out: usize| {
+            let mut prepared = self.clone();
+            prepared.leave_out(left_out, one.span());
+            let again = prepared.settle(fitted.hypothesis.clone(), fitted.asked.clone());
+            again.map_or(f64::INFINITY, |(fitted, _)| {
+                fitted.cost - fitted.rows as f64
+            })
+        };
+        if misfit_without(other) < misfit_without(trial) {
+            (one.in_the_other_repeat(other), other)
+        } else {
+            (one, trial)
+        }
     }
 
     /// The clearest disturbance of a single trial where joints move; else one that is known, in whole trials.

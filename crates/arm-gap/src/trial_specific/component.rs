@@ -72,6 +72,19 @@ impl TrialSpecific {
         same && self.trial.is_some() && (self.span().0 - other.span().0).abs() < NEAR
     }
 
+    /// What would make the same difference between two repeats in the other one: the opposite of it.
+    pub fn in_the_other_repeat(mut self, trial: usize) -> Self {
+        self.trial = Some(trial);
+        let rivals = self.rivals.iter_mut().map(|(effect, _)| effect);
+        for effect in std::iter::once(&mut self.effect).chain(rivals) {
+            let sizes = effect.kind.prior().parts.iter().flat_map(|part| part.sizes);
+            for &size in sizes {
+                effect.parameters[size] = -effect.parameters[size];
+            }
+        }
+        self
+    }
+
     /// From when to when it lasts \[s\].
     pub fn span(&self) -> (f64, f64) {
         let p = &self.effect.parameters;

@@ -88,6 +88,21 @@ impl<const N: usize> PreparedSession<'_, N> {
         Ok(found.map(|found| self.at_the_peak(found, (point, &residuals))))
     }
 
+    /// What swings in the residuals as a rhythm does that was found before, as far as it is plain.
+    ///
+    /// # Errors
+    /// [`GapError::Simulation`] where the hypothesis cannot be simulated.
+    pub fn swinging_near(
+        &self,
+        rhythm: &TrialSpecific,
+        point: &LinearizationPoint<N>,
+    ) -> Result<Option<TrialSpecific>, GapError> {
+        let residuals = self.raw_residuals(point)?;
+        let found = self.swinging_at(rhythm.wave()[0], (point, &residuals));
+        let found = found.map(|found| self.at_the_peak(found, (point, &residuals)));
+        Ok(found.filter(|found| found.is_like(rhythm)))
+    }
+
     /// What swings, at the frequency at which the residuals have their peak if it explains more there: where tip and handle come apart, a rhythm
     /// of muscles hardly shows.
     fn at_the_peak(

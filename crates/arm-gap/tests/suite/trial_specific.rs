@@ -5,6 +5,7 @@ use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::session::Session;
 use arm_gap::trial_specific::component::TrialSpecific;
 use arm_gap::trial_specific::tremor_detection::Line;
+use arm_ident::regression::trial::Role;
 use core::f64::consts::TAU;
 
 use crate::sessions::{RATE, known, session};
@@ -92,6 +93,27 @@ fn a_burst_is_found_with_its_joint_and_not_below_twice_the_dry_friction() {
     // Two repeats may hold the elbow with 0.2 N m to either side.
     assert!(disturbance(&tense(0.2, 0.35)).is_none());
     assert!(disturbance(&tense(0.0, 0.35)).is_some());
+}
+
+/// Of two repeats each looks disturbed beside the other, and a model that was fitted to both is as far from one as from the other.
+#[test]
+fn of_two_repeats_the_disturbed_one_is_that_without_which_the_model_fits() {
+    for disturbed in [0, 1] {
+        let mut session = tense(0.0, 0.8);
+        session.trials.swap(1, disturbed);
+        // Two repeats of each movement to fit.
+        for movement in [0, 4] {
+            session.trials[movement + 2].role = Role::Test;
+        }
+        let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+        let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+        let bursts = finding.trial_specific.iter();
+        let mut bursts = bursts.filter(|one| one.effect.kind.prior().nature == Nature::Burst);
+        let found = bursts.next().expect("a burst");
+        assert_eq!((found.effect.index, found.trial), (1, Some(disturbed)));
+        assert!((found.effect.parameters[0] - 0.8).abs() < 0.1, "{found:?}");
+        assert!(bursts.next().is_none());
+    }
 }
 
 #[test]

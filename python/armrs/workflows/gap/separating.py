@@ -102,8 +102,8 @@ def _separated(result: GapFound, effect: Missing, family: Sequence[Candidate], t
             continue
         distance, best = max(found, key=lambda pair: pair[0])
         expected, then = float(now[k]) / noise, float(distance) / noise
-        # What was expected of the fit trials to first order is known by now: what the new trial adds to it is not.
-        seen = min(expected, float(np.sqrt(max(alternative.worse, 0.0))))
+        # What was expected of the fit trials to first order is known by now, whichever of the two it favours.
+        seen = min(expected, float(np.sqrt(abs(alternative.worse))))
         separation = Separation(
             waypoints_deg=tuple(tuple(float(v) for v in np.round(np.degrees(row), 1)) for row in best.movement.waypoints),
             speed_rad_s=best.movement.speed,
