@@ -186,9 +186,9 @@ _FILES = {
 
 
 def _remedy(error: ArmrsError) -> str:
-    """Return the next step about an error."""
+    """Return the next step about an error; nothing where the error itself says it."""
     if not isinstance(error, BadInput):
-        return "correct the file that it names"
+        return ""
     if (error.hint or error.allowed).endswith("or that file") or "no data set" in str(error.found):
         return "give the folder that armrs import, record or demo wrote"
     if str(error.found).startswith(("no column for", "neither forces nor torques")):
@@ -212,7 +212,7 @@ def _remedy(error: ArmrsError) -> str:
         return "write one row with the names of the columns, then one row of numbers a sample; armrs import reads other tables"
     if of_samples and place.startswith(("column", "row", "Fy", "q", "angles")):
         return "correct the column: its unit, its sign, or its values"
-    return "correct it in the file that it names"
+    return ""
 
 
 _WARNINGS = (
