@@ -358,7 +358,7 @@ def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     try:
         return path, Description.load(path)
     except BadInput as first:
-        raise BadInputs.of(faults_of(path) or [first]) from None
+        raise BadInputs.of(faults_of(path).found or [first]) from None
 
 
 def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: str | None = None) -> Path:

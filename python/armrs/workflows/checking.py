@@ -17,7 +17,8 @@ from .. import checks
 from ..analysis.passivity_checks import SLOW
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
-from ..io.dataset import NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
+from ..io.dataset import FILE, NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
+from ..io.faults import faults_of
 from ..io.samples import NUMBER, header_of
 from ..io.trial import Reading, Trial, moving_bases, still_angles
 from ..model import Description, Model, TrialEntry
@@ -128,6 +129,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     tell("reading", 0.0)
     described = _caught(lambda: describe(source), problems)
     if described is None:
+        _despite_faults(Path(source), problems)
         return Checked(
             tuple(problems), tuple(Ability(verb, False, "the data set cannot be read") for verb in ("identify", "passive", "gap"))
         )
@@ -160,6 +162,19 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     problems += other
     tell("passive moments", 0.8)
     return Checked(_feasible(dict.fromkeys(_not_implied(problems)), whole), _abilities(whole, blocked, bool(other)), whole)
+
+
+def _despite_faults(source: Path, problems: list[Problem]) -> None:
+    """Add the problems of model and trial files where faults of `dataset.toml` leave them to be read."""
+    path = source / FILE if source.is_dir() else source
+    try:
+        faults = faults_of(path)
+    except BadInput:  # it is among the problems
+        return
+    if faults.rest is not None:
+        rest = faults.rest
+        model = _caught(lambda: described_model(path.parent, rest), problems) if faults.names_model else None
+        _trials(path.parent, rest, model, problems)
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
