@@ -149,7 +149,7 @@ def test_of_two_rates_in_halves_one_that_was_recorded_is_told(session: Path, tmp
 
 def test_two_joints_are_not_one_problem_and_one_more() -> None:
     """It was: joint 1 moves by 0.0011 rad in the fit trials and 1 more: what holds it cannot be told."""
-    of_joints = [Problem("warning", f"joint {k} moves by 0.00{k} rad: what holds it cannot be told", "move it") for k in (1, 2)]
+    of_joints = [Problem("warning", f"joint {k} moves by 0.00{k} rad: what holds it cannot be determined", "move it") for k in (1, 2)]
     assert grouped(of_joints) == of_joints
     of_files = [Problem("warning", f"trials/slow_{k}.csv: one cause", "look") for k in (1, 2)]
     assert [p.text for p in grouped(of_files)] == ["trials/slow_1.csv and 1 more: one cause"]

@@ -247,7 +247,7 @@ _WARNINGS = (
     ("no movement was repeated", "record repeats of each movement"),
     ('role = "test"', 'set role = "test" for one repeat of each movement'),
     ("hardly", "move the joint, or give its law in the model"),
-    ("what holds it cannot be told", "move the joint, or give its law in the model"),
+    ("what holds it cannot be determined", "move the joint, or give its law in the model"),
     ("a joint that is held", "nothing, if the joint was held; else repair its sensor"),
     ("begin them at one", "cut the trials at a rest"),
     ("at a higher rate", "record the robot at a higher rate, or let it start and stop smoothly"),

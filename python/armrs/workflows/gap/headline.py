@@ -189,10 +189,10 @@ def undecided(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
     kinds = joined([title(e["kind"]) for e in stated], "or")
     where = _trial(effect)
     if len(here) > 1:
-        return joined([effect_name(e, joints) for e in stated], "or") + f"{where}, which these movements cannot tell apart"
+        return joined([effect_name(e, joints) for e in stated], "or") + f"{where}, which these movements cannot distinguish"
     if len(families) == 1 and (name := _FAMILIES.get(families.pop())):
-        return effect_name({**effect, "kind": name}, joints) + f"{where} ({kinds}: not told apart)"
-    return effect_name({**effect, "kind": kinds}, joints) + f"{where}, which these movements cannot tell apart"
+        return effect_name({**effect, "kind": name}, joints) + f"{where} ({kinds}: not distinguished)"
+    return effect_name({**effect, "kind": kinds}, joints) + f"{where}, which these movements cannot distinguish"
 
 
 def _trial(effect: Mapping[str, Any]) -> str:
