@@ -252,7 +252,10 @@ def followed(result: Mapping[str, Any]) -> None:
 
 
 def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
-    """Print what the demonstration came to."""
+    """Print what the demonstration came to: the result of the search, where the report is, and then the details."""
+    print(verdict(result))
+    files_written(written[-1:])
+    print()
     print("\n".join(result["story"]))
     print()
     show(result["comparison_text"], tables.comparison(result))
@@ -261,12 +264,9 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     print()
     print("The slow movements alone do not separate all effects:")
     print("\n".join(f"  {line}" for line in result["slow_alone"]["lines"]))
-    print()
-    print(verdict(result))
     sessions = [path.parent for path in written if path.name == "dataset.toml"]
     if sessions:
-        print(f"Go on with: armrs identify {sessions[0]} --with coulomb, or armrs gap {sessions[-1]}")
-    files_written(written[-1:])
+        print(f"\nGo on with: armrs identify {sessions[0]} --with coulomb, or armrs gap {sessions[-1]}")
 
 
 def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
