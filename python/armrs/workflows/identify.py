@@ -62,7 +62,7 @@ class Identified(Tabular, Series):
     left_out : tuple of str
         What of the model the method does not take into account, or finds nothing about in these movements.
     trades : tuple of str
-        Which unknowns the movements cannot tell apart, in words.
+        Which unknowns the movements cannot distinguish, in words.
     scale_free : bool
         No torque acted: all parameters are known up to one common factor, which was taken from the model.
     level : float
@@ -152,7 +152,7 @@ class Identified(Tabular, Series):
 
     @property
     def trades(self) -> tuple[str, ...]:
-        """Which unknowns the movements cannot tell apart, in words."""
+        """Which unknowns the movements cannot distinguish, in words."""
         return self.result.trades
 
     @property
