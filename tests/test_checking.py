@@ -398,6 +398,7 @@ def test_what_follows_from_a_fault_is_none(tmp_path: Path, text: str, said: list
         ('role = "fit"', 'role = "fitt"', "role: found 'fitt'"),
         ('force_on = "robot"', 'forceon = "robot"', "found unknown key 'forceon'"),
         ('model = "model.toml"', "model = 3", "model: found 3"),
+        ('file = "trials/slow_1.csv"', 'file = ""', "[[trial]] "),
         ("[[trial]]", "[[added]]\nx = 3\n\n[[trial]]", "[[added]] 1: found unknown key 'x'"),
     ],
 )

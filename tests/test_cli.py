@@ -196,7 +196,7 @@ def test_the_folder_of_another_verb_is_refused_before_any_work(
     capsys.readouterr()
     monkeypatch.setattr("armrs.io.dataset.load_dataset", lambda source: pytest.fail("work was done"))
     for verb in ("gap", "identify", "spasticity"):
-        assert "found the report of armrs passive" in refused(capsys, verb, str(slow_arm), "-o", out)
+        assert "this folder holds a report of armrs passive" in refused(capsys, verb, str(slow_arm), "-o", out)
 
 
 def test_a_result_is_replaced_whole(slow_arm: Path, tmp_path: Path) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import copy
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..errors import BadInput
-from ..model import Description
+from ..model import Description, TrialEntry
 from . import tomlfile
 
 _MOST = 100
@@ -29,14 +29,17 @@ class Faults:
     found : list of BadInput
         Without what only follows from something else; empty when the file is sound.
     rest : Description or None
-        With the trials whose file is named without a fault; None where a fault leaves nothing to read.
+        None where a fault leaves nothing to read.
+    trials : list of TrialEntry
+        Those of `rest` whose file is named without a fault.
     names_model : bool
         Whether the model of `rest` is what the file says: a model file, or a subject without a fault.
     """
 
     found: list[BadInput]
-    rest: Description | None
-    names_model: bool
+    rest: Description | None = None
+    trials: list[TrialEntry] = field(default_factory=list)
+    names_model: bool = False
 
 
 def faults_of(path: Path) -> Faults:
@@ -58,12 +61,11 @@ def faults_of(path: Path) -> Faults:
         read = _read(document)
         if isinstance(read, Description):
             named = [trial.get("file") for trial in written["trial"]]
-            trials = [trial for trial in read.trials if trial.file in named]
-            return Faults(found, read.replace(trials=trials) if trials else None, read.model == written.get("model"))
+            return Faults(found, read, [trial for trial in read.trials if trial.file in named], read.model == written.get("model"))
         found.append(read.within(file=path))
         if not _mend(document, read):
             break
-    return Faults(found, None, False)
+    return Faults(found)
 
 
 def _read(document: dict[str, Any]) -> Description | BadInput:

@@ -135,7 +135,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
         )
     path, description = described
     model = _caught(lambda: described_model(path.parent, description), problems)
-    trials = _trials(path.parent, description, model, problems)
+    trials = _trials(path.parent, description, description.trials, model, problems)
     if model is None or not trials:
         why = "no model" if model is None else "no trial can be read"
         return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
@@ -174,7 +174,7 @@ def _despite_faults(source: Path, problems: list[Problem]) -> None:
     if faults.rest is not None:
         rest = faults.rest
         model = _caught(lambda: described_model(path.parent, rest), problems) if faults.names_model else None
-        _trials(path.parent, rest, model, problems)
+        _trials(path.parent, rest, faults.trials, model, problems)
 
 
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
@@ -311,9 +311,12 @@ def _warned(text: str) -> Problem:
     return Problem("warning", text, step)
 
 
-def _trials(folder: Path, description: Description, model: Model | None, problems: list[Problem]) -> list[Trial]:
+def _trials(
+    folder: Path, description: Description, entries: Iterable[TrialEntry], model: Model | None, problems: list[Problem]
+) -> list[Trial]:
+    """Return the trials of some entries that can be read; what is wrong with the others is added to the problems."""
     trials = []
-    for entry in description.trials:
+    for entry in entries:
         path = folder / entry.file
         if model is not None:
             joints: int | None = model.n_joints
