@@ -83,10 +83,10 @@ def test_convert(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture
         (["effects", "coulom"], "KIND: found unknown kind of effect 'coulom', allowed"),
         (
             ["convert", "nothing", "-o", "out"],
-            "nothing: file: found No such file or directory, allowed a data set's folder or dataset.toml, or a file of .csv, .parquet, .mot, ",
+            "nothing: no such file, allowed a data set's folder or dataset.toml, or a file of .csv, .parquet, .mot, ",
         ),
-        (["convert", "nope.xyz", "-o", "out"], "nope.xyz: file: found No such file or directory, allowed a data set's folder"),
-        (["convert", "nothing.csv", "-o", "out"], "nothing.csv: file: found No such file or directory"),
+        (["convert", "nope.xyz", "-o", "out"], "nope.xyz: no such file, allowed a data set's folder"),
+        (["convert", "nothing.csv", "-o", "out"], "nothing.csv: no such file"),
         (["convert", "nul\0l.csv", "-o", "out"], "embedded null"),
     ],
 )
@@ -183,7 +183,7 @@ def test_no_verb_replaces_the_report_of_another(slow_arm: Path, tmp_path: Path, 
         ["report", str(out / "identified.json")],
     ):
         line = refused(capsys, *arguments, "-o", out)
-        assert "report.html: file: found the report of armrs identify, allowed a folder of its own: another -o DIR" in line
+        assert "report.html: this folder holds a report of armrs identify; choose another -o" in line
     assert (out / "report.html").read_bytes() == page and not (out / "simulated.json").exists()
 
 
@@ -196,7 +196,7 @@ def test_the_folder_of_another_verb_is_refused_before_any_work(
     capsys.readouterr()
     monkeypatch.setattr("armrs.io.dataset.load_dataset", lambda source: pytest.fail("work was done"))
     for verb in ("gap", "identify", "spasticity"):
-        assert "found the report of armrs passive" in refused(capsys, verb, str(slow_arm), "-o", out)
+        assert "this folder holds a report of armrs passive" in refused(capsys, verb, str(slow_arm), "-o", out)
 
 
 def test_a_result_is_replaced_whole(slow_arm: Path, tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ def test_files_that_no_report_says_are_its_own_are_not_replaced(slow_arm: Path, 
     mine.parent.mkdir()
     mine.write_text("# mine", encoding="utf-8")
     line = refused(capsys, "identify", str(slow_arm), "-o", mine.parent)
-    assert "identified.toml: file: found a file that armrs identify did not write: no report is beside it" in line
+    assert "identified.toml: armrs identify did not write this file; choose another -o" in line
     assert mine.read_text(encoding="utf-8") == "# mine" and [mine] == list(mine.parent.iterdir())
 
 
@@ -238,5 +238,5 @@ def test_a_page_of_someone_else_is_not_replaced(slow_arm: Path, tmp_path: Path, 
         cli.main(["simulate", str(slow_arm / "truth.toml"), "--trial", str(slow_arm / "trials" / "slow_1.csv"), "-o", str(page.parent)])
         == 2
     )
-    assert "report.html: file: found a page that armrs did not make, allowed a folder of its own" in capsys.readouterr().err
+    assert "report.html: this folder holds a page that armrs did not make; choose another -o" in capsys.readouterr().err
     assert page.read_text(encoding="utf-8") == "<p>the laboratory's own page</p>" and [page] == list(page.parent.iterdir())

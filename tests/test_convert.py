@@ -168,7 +168,7 @@ def test_another_data_set_is_not_replaced(session: Session, tmp_path: Path, caps
     other.edit("dataset.toml", DATASET.splitlines()[0], 'name = "another"')
     before = (other.folder / "dataset.toml").read_bytes()
     assert cli.main(["convert", str(session.folder), "-o", str(other.folder)]) == 2
-    assert "found another data set, allowed a folder of its own" in capsys.readouterr().err
+    assert "this folder holds another data set; choose another -o" in capsys.readouterr().err
     assert (other.folder / "dataset.toml").read_bytes() == before
     assert [cli.main(["convert", str(session.folder), "-o", str(tmp_path / "new")]) for _ in range(2)] == [0, 0]
 

@@ -373,7 +373,7 @@ def test_a_run_that_is_no_result_writes_its_diagnosis_alone(folder: Path, capsys
         ("step_s = 0.002", "step_s = 0.0", "step_s: found 0.0, allowed a finite number > 0 s"),
         ("step_s = 0.002", "step_s = 5.0", "duration_s"),
         ("step_s = 0.002", "stepp_s = 0.002", "unknown key"),
-        ('model = "arm.toml"', 'model = "leg.toml"', "leg.toml: file: found No such file"),
+        ('model = "arm.toml"', 'model = "leg.toml"', "leg.toml: no such file"),
         ('model = "arm.toml"', 'fmu = "arm.toml"', "unknown key 'port', allowed fmu, name, seconds, start"),
         (
             'model = "arm.toml"\nport = "force"\nstart_deg = [-150.0, 20.0]',

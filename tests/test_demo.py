@@ -98,8 +98,11 @@ def test_the_search_finds_the_brakes_and_closes_the_gap(folder: Path, result: di
 
 def test_the_slow_movements_alone_cannot_tell_dry_friction_from_viscosity(result: dict) -> None:
     (shoulder,) = (line for line in result["slow_alone"]["lines"] if "joint 1 (shoulder)" in line)
-    assert "cannot be told from" in shoulder
+    assert "cannot be distinguished from" in shoulder
     assert "viscous damping" in shoulder and "Coulomb friction" in shoulder
+    # What is not separated comes first.
+    torn = ["cannot be distinguished from" in line for line in result["slow_alone"]["lines"]]
+    assert torn == sorted(torn, reverse=True)
 
 
 def test_a_converted_data_set_is_still_synthetic(folder: Path, tmp_path: Path) -> None:
@@ -129,7 +132,7 @@ def test_no_string_of_the_result_becomes_markup(folder: Path, tmp_path: Path) ->
     assert unescaped(folder / "demo.json", tmp_path) == []
 
 
-def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
+def test_the_terminal_begins_with_the_result_and_the_report_and_ends_with_how_to_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     class Stub:
@@ -149,8 +152,8 @@ def test_the_terminal_says_how_to_go_on_and_ends_with_the_report(
     monkeypatch.setattr(demo, "run_demo", lambda out, command, tell: Stub)
     (tmp_path / "demo.json").write_text(json.dumps(plain), encoding="utf-8")
     assert cli.main(["demo", "-o", str(tmp_path)]) == 0
-    go_on, last = capsys.readouterr().out.splitlines()[-2:]
-    assert last == str(tmp_path / "report.html")
+    first, second, *_, go_on = capsys.readouterr().out.splitlines()
+    assert (first, second) == ("c", str(tmp_path / "report.html"))
     assert f"armrs identify {tmp_path / 'data'} --with coulomb" in go_on
     assert f"armrs gap {tmp_path / 'data'}" in go_on
 

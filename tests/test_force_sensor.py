@@ -276,7 +276,7 @@ def test_such_a_session_is_identified_and_searched(experiment: Path, tmp_path: P
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("handle_m = [0.10, 0.02]\n", "", r"\[sensors\.six_axis\], handle_m: found nothing, allowed key handle_m is required"),
+        ("handle_m = [0.10, 0.02]\n", "", r"`handle_m` is missing in \[sensors\.six_axis\]"),
         ("tool_mass_kg", "tool_mass", r"\[sensors\.six_axis\]: found unknown key 'tool_mass', .*nearest known: tool_mass_kg"),
         ("mass_kg = 0.5", "mass_kg = -0.5", r"\[sensors\.six_axis\], tool_mass_kg: found -0\.5, allowed a finite number 0 to 20 kg"),
         ("[0.06, -0.01]", "[60, -10]", r"\[sensors\.six_axis\], tool_com_m\[0\]: found 60\.0, allowed a finite number -1 to 1 m"),

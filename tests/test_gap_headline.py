@@ -6,15 +6,18 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+import armrs
 from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
 from armrs.cli.analysis import after_gap
-from armrs.workflows.gap.headline import amount, headline, still_open
+from armrs.workflows.demo import handed_over, true_model
+from armrs.workflows.gap.headline import amount, headline, still_open, undecided
 from armrs.workflows.gap.results import formula_of
 from armrs.workflows.gap.summary import marks, rivals
-from armrs.workflows.gap.words import calibration, gap, heading, intervals, left, missing, named, nearest, others, tie
+from armrs.workflows.gap.words import calibration, gap, heading, intervals, left, missing, named, nearest, others, quick, show, tie
 
 
 def channel(before: float, calibrated: float, after: float, floor: float | None) -> dict[str, Any]:
@@ -90,9 +93,48 @@ def test_an_open_gap_contradicts_no_sentence() -> None:
 
 def test_the_next_step_speaks_of_an_open_gap_only_where_a_channel_is_open() -> None:
     """A lack of fit alone makes a result unexplained: no channel of its report was open."""
-    step = after_gap(result("unexplained", DRY, open=[]), Path("s"), Path("out"))
+    step = after_gap(result("unexplained", DRY, open=[]), Path("s"), Path("out"), session())
     assert step == "out/report.html shows where model and data disagree; armrs check s lists problems of the recordings"
-    assert "in which channel the gap is open" in after_gap(result("unexplained", open=[{"channel": "q3_rad"}]), Path("s"), Path("out"))
+    opened = result("unexplained", open=[{"channel": "q3_rad"}])
+    assert "in which channel the gap is open" in after_gap(opened, Path("s"), Path("out"), session())
+
+
+def session(subject: armrs.Subject | None = None, **channels: np.ndarray) -> armrs.Dataset:
+    """Return a data set of a mechanical arm with one test trial, or that of a subject."""
+    t = np.linspace(0.0, 1.0, 30)
+    trial = armrs.Trial("trials/a_2.csv", "a", 2, "test", t, np.column_stack([t, t]), **channels)
+    model = handed_over(true_model())
+    return armrs.Dataset("arm", model, (trial,), folder=Path("s"), subject=subject or armrs.Subject())
+
+
+def test_a_mechanical_arm_has_no_page_for_a_clinician_as_next_step() -> None:
+    """It was the page in plain words, also after the brakes of the demonstration."""
+    torques = np.zeros((30, 2))
+    after = [
+        after_gap(told, Path("s"), Path("out"), data)
+        for told, data in (
+            (result("explained", DRY), session(tau=torques)),
+            (result("explained", DRY), session()),
+            (result("nothing_missing"), session(tau=torques)),
+            (result("explained", DRY), session(armrs.Subject(body_mass=70.0), tau=torques)),
+        )
+    ]
+    shown = "out/report.html shows the gap before and after"
+    assert after == [
+        f"{shown}; armrs simulate out/amended.toml --trial s/trials/a_2.csv -o simulated simulates a trial with the amended model",
+        shown,
+        "armrs identify s -o identified",
+        "armrs report out/gap.json --summary -o clinic writes one page in plain words",
+    ]
+
+
+def test_the_files_that_are_listed_are_the_model_the_result_and_the_report(capsys: pytest.CaptureFixture[str]) -> None:
+    """It was the report alone."""
+    written = [Path("out") / name for name in ("amended.toml", "figures/gap.png", "figures/live.json", "gap.json", "report.html")]
+    show(
+        result("explained", DRY | {"share": 0.5, "without": None}, where=[], data={"joints": ["shoulder", "elbow"], "name": "arm"}), written
+    )
+    assert capsys.readouterr().out.splitlines()[-3:] == ["out/amended.toml", "out/gap.json", "out/report.html"]
 
 
 def test_parameters_that_a_law_does_without_have_no_row() -> None:
@@ -155,12 +197,12 @@ def test_what_is_not_decided_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> N
     rival = {"kind": "viscous", "joint": 1, "channel": None}
     torn = effect("coulomb", 1, ("torque", 0.14, 0.01, "N m"), decided=False, family="dry", alternatives=[rival])
     assert headline(result("explained", torn)).startswith(
-        "Missing from the model is Coulomb friction or viscous damping in joint 1 (shoulder), which these movements cannot tell apart: with it, "
+        "Missing from the model is Coulomb friction or viscous damping in joint 1 (shoulder), which these movements cannot distinguish: with it, "
     )
     monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
     one_family = headline(result("explained", {**torn, "alternatives": [{**rival, "kind": "stribeck"}]}))
     assert one_family.startswith(
-        "Missing from the model is dry friction in joint 1 (shoulder) (Coulomb friction or Stribeck friction: not told apart): with it, "
+        "Missing from the model is dry friction in joint 1 (shoulder) (Coulomb friction or Stribeck friction: not distinguished): with it, "
     )
     elsewhere = {**torn, "alternatives": [{**rival, "joint": 2}]}
     assert "Coulomb friction in joint 1 (shoulder) or viscous damping in joint 2 (elbow), which" in headline(result("explained", elsewhere))
@@ -171,7 +213,7 @@ def test_a_trial_stands_beside_what_is_not_decided_in_it() -> None:
     slip = {**effect("handle_slip", None, ("y", 2e-3, 1e-4, "m")), "decided": False, "trial": "trials/a_3.csv", "alternatives": [rival]}
     said = headline(result("explained", slip))
     assert said.startswith(
-        "Missing from the model is handle slip or angle offset in joint 1 (shoulder) in trials/a_3.csv only, which these movements cannot tell apart: "
+        "Missing from the model is handle slip or angle offset in joint 1 (shoulder) in trials/a_3.csv only, which these movements cannot distinguish: "
     )
 
 
@@ -184,7 +226,7 @@ def test_many_effects_are_named_by_kind(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
     torn = {**DRY, "decided": False, "alternatives": [{"kind": "stribeck", "joint": 2, "channel": None}]}
     said = headline(result("explained", *springs, torn))
-    assert "joints 1, 2 and 3; dry friction in joint 2 (Coulomb friction or Stribeck friction: not told apart)): with them, " in said
+    assert "joints 1, 2 and 3; dry friction in joint 2 (Coulomb friction or Stribeck friction: not distinguished)): with them, " in said
 
 
 def test_nothing_is_claimed_that_was_not_tested() -> None:
@@ -309,7 +351,7 @@ def test_alternatives_are_compared_in_one_unit() -> None:
     assert line.endswith(
         "it may be viscous damping in joint 2 (explains these movements to within the possible error of the named law, by 170 units less)."
     )
-    # What is 13 standard deviations apart already cannot be told apart only because a law may miss as much.
+    # What is 13 standard deviations apart already cannot be distinguished only because a law may miss as much.
     asked = {"separating_movement": "lead the elbow alone", "separation": {"now": 13.0, "then": 40.0}}
     lines = others(result("explained", {**DRY, "alternatives": [{**far, **asked}]}))
     assert lines[1].endswith("40 standard deviations apart (now 13, which the error of the named law may cause).")
@@ -350,3 +392,25 @@ def test_a_gap_beyond_a_hundred_has_no_exponent() -> None:
 def test_friction_that_sticks_has_the_sign_of_the_speed_in_its_formula(smoothing: float, formula: str) -> None:
     effect = {"kind": "coulomb", "parameters": {"torque": {"value": 0.2}, "smoothing": {"value": smoothing}}}
     assert formula_of(effect) == formula
+
+
+def test_a_first_look_says_how_many_effects_improve_the_fit(capsys: pytest.CaptureFixture[str]) -> None:
+    """It was `2 effects may be missing, and several of them may be one`."""
+    asked = [
+        {"kind": kind, "joint": 2, "channel": None, "gain": gain, "price": 20.0, "parameters": {"size": 0.1}, "unit": "N m"}
+        for kind, gain in (("coulomb", 90.0), ("viscous", 60.0), ("elastic", 3.0))
+    ]
+    quick(result("explained", suspects=asked, data={"joints": ["shoulder", "elbow"], "name": "arm"}))
+    said = "arm, a first look: 2 effects each improve the fit; several may have one cause; Coulomb friction in joint 2 explains most"
+    assert capsys.readouterr().out.startswith(said)
+
+
+def test_a_rival_that_is_closer_to_the_data_is_not_called_a_tie() -> None:
+    rival = {"kind": "cubic_elastic", "joint": 2, "channel": None, "worse": -2177.0}
+    effect = {"kind": "elastic", "joint": 2, "channel": None, "decided": False, "alternatives": [rival]}
+    said = undecided(effect)
+    assert said == "elastic spring in joint 2 (rarer, but closer to the data: cubic spring)"
+    assert "distinguish" not in tie({"effects": [effect]})
+    rival["worse"] = 3.0
+    assert "not distinguished" in undecided(effect)
+    assert "cannot be distinguished" in tie({"effects": [effect]})

@@ -577,7 +577,8 @@ def test_an_import_replaces_a_former_one_whole_and_nothing_of_another_origin(rec
         file.write("\n[tolerance]\nforce_bias_N = 0.5\n")
     for again in (sources[:1], [made.folder / "import.toml"]):
         with pytest.raises(
-            BadInput, match=r"set: -o: found the data set of a former import, allowed .* or --force, which replaces it whole"
+            BadInput,
+            match=r"set: this folder holds the data set of a former import; choose another -o, or --force, which replaces it whole",
         ):
             armrs.import_recordings(again, tmp_path / "set", model=KNOWN)
     assert armrs.load_dataset(made.folder).tolerance.force_bias_N == 0.5 and len(list((made.folder / "trials").iterdir())) == 3

@@ -55,7 +55,7 @@ def test_needs_only_segments_and_joints(path: Path) -> None:
 BROKEN = {
     "unknown key": ("mass = 2.114", "mas = 2.114", "[[arm.segment]] 1: found unknown key 'mas'", "(nearest known: mass)"),
     "unknown table": ("[contact]", "[contakt]", "found unknown key 'contakt'", "(nearest known: contact)"),
-    "missing key": ("mass = 2.114\n", "", "[[arm.segment]] 1, mass: found nothing, allowed key mass is required", ""),
+    "missing key": ("mass = 2.114\n", "", "`mass` is missing in [[arm.segment]] 1", ""),
     "mass zero": ("mass = 2.114", "mass = 0.0", "[[arm.segment]] 1, mass: found 0.0, allowed a finite number > 0 kg", ""),
     "mass negative": ("mass = 2.114", "mass = -1", "[[arm.segment]] 1, mass: found -1.0, allowed a finite number > 0 kg", ""),
     "mass infinite": ("mass = 2.114", "mass = inf", "mass: found inf, allowed a finite number > 0 kg", ""),
@@ -94,13 +94,13 @@ BROKEN = {
     "elbow": ('elbow = "up"', 'elbow = "left"', '[robot], elbow: found \'left\', allowed "up" or "down"', ""),
     "robot link": ("lengths = [0.45, 0.45]", "lengths = [0.45, 0]", "[robot], lengths[1]: found 0.0, allowed a finite number > 0", ""),
     "contact stiffness": ("stiffness = [10000.0, 10000.0]", "stiffness = [0, 1]", "[contact], stiffness[0]: found 0.0, allowed", "> 0 N/m"),
-    "contact missing": ("stiffness = [10000.0, 10000.0]\n", "", "[contact], stiffness: found nothing", ""),
+    "contact missing": ("stiffness = [10000.0, 10000.0]\n", "", "`stiffness` is missing in [contact]", ""),
     "table for a list": ("[[effect]]", "[effect]", "effect: found one table, allowed a list of tables, written [[effect]]", ""),
     "value for a table": ("[robot]", "[arm.robot]", "[arm]: found unknown key 'robot'", ""),
     "joint beyond the arm": ("joint = 2", "joint = 3", "[[effect]] 1 (coulomb), joint: found 3, allowed 1 to 2", ""),
     "joint zero": ("joint = 2", "joint = 0", "[[effect]] 1 (coulomb), joint: found 0, allowed a whole number >= 1", ""),
     "joint as float": ("joint = 2", "joint = 2.0", "[[effect]] 1 (coulomb), joint: found 2.0, allowed a whole number", ""),
-    "effect without kind": ('kind = "coulomb"\n', "", "[[effect]] 1, kind: found nothing, allowed key kind is required", ""),
+    "effect without kind": ('kind = "coulomb"\n', "", "`kind` is missing in [[effect]] 1", ""),
     "unknown kind": (
         '"coulomb"',
         '"coulom"',
@@ -131,7 +131,7 @@ def test_refuses(path: Path, name: str) -> None:
 
 def test_refuses_a_file_without_an_arm(path: Path) -> None:
     path.write_text("", encoding="utf-8")
-    assert refusal(path) == "arm: found nothing, allowed key arm is required"
+    assert refusal(path) == "`arm` is missing"
 
 
 def test_refuses_a_value_for_a_table(path: Path) -> None:
@@ -150,7 +150,7 @@ def test_refuses_text_that_is_not_utf8(path: Path) -> None:
 
 
 def test_refuses_a_file_that_is_not_there(tmp_path: Path) -> None:
-    assert "No such file" in refusal(tmp_path / "none.toml")
+    assert refusal(tmp_path / "none.toml") == "no such file"
 
 
 def test_refuses_a_folder(tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def test_a_measured_data_set_is_never_replaced(experiment: Path, session: Sessio
     """It wrote its own dataset.toml and model.toml over those of the laboratory."""
     before = {path: path.read_bytes() for path in session.folder.rglob("*") if path.is_file()}
     assert main(["record", str(experiment), "-o", str(session.folder)]) == 2
-    assert "found a data set that armrs record did not write, allowed a folder of its own" in capsys.readouterr().err
+    assert "this folder holds a data set that armrs record did not write; choose another -o" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in session.folder.rglob("*") if path.is_file()} == before
 
 

@@ -60,7 +60,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "synthetic is no number": (IDENTIFY, lambda f: f.edit("dataset.toml", "synthetic = true", "synthetic = 1"), "synthetic: found 1, allowed true or false"),
     "mass of zero": (IDENTIFY, lambda f: f.edit("model.toml", "mass = 1.58", "mass = 0.0 #"), "[[arm.segment]] 1, mass: found 0.0"),
     "mass that is text": (MOVE, lambda f: f.edit("truth.toml", "mass = 1.44", 'mass = "x" #'), "[[arm.segment]] 1, mass: found 'x'"),
-    "no trial file": (PASSIVE, lambda f: (f.path / "trials/slow_2.csv").unlink(), "slow_2.csv: [[trial]] 2 of dataset.toml, file: found no such file"),
+    "no trial file": (PASSIVE, lambda f: (f.path / "trials/slow_2.csv").unlink(), "slow_2.csv: [[trial]] 2 of dataset.toml: no such file"),
     "unknown unit": (IDENTIFY, lambda f: f.edit("trials/slow_1.csv", "q1_rad", "q1_grad"), "header: found 'q1_grad', allowed a known unit"),
     "degrees under radians": (IDENTIFY, lambda f: f.cell(9, 1, "-1000"), "line 9, column q1_rad: found -1000.0"),
     "text in a cell": (PASSIVE, lambda f: f.cell(9, 2, "abc"), "line 9, column q2_rad: found 'abc'"),
@@ -75,7 +75,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
     "no samples": (FOLLOW, lambda f: f.lines(lambda lines: lines[:1]), "slow_1.csv: file: found no samples below the header"),
     "one complete gap": (IDENTIFY, lambda f: f.lines(lambda lines: [lines[0], *[x.split(",")[0] + "," * x.count(",") for x in lines[1:]]]), "no sample at all"),
     "model that is no TOML": (MOVE, lambda f: f.edit("truth.toml", "[arm]", "[arm"), "truth.toml: "),
-    "model that is not there": (("simulate", "no.toml", "--movement", "data/movement.toml"), nothing, "no.toml: file: found No such file"),
+    "model that is not there": (("simulate", "no.toml", "--movement", "data/movement.toml"), nothing, "no.toml: no such file"),
     "a folder as model": (("simulate", "data", "--movement", "data/movement.toml"), nothing, "data: file: found a folder"),
     "a model in UTF-16": (
         MOVE, lambda f: (f.path / "truth.toml").write_text((f.path / "truth.toml").read_text("utf-8"), "utf-16") and None,
@@ -87,7 +87,7 @@ CASES: dict[str, tuple[tuple[str, ...], Callable[[Folder], None], str]] = {
         FOLLOW, lambda f: (f.path / "trials/slow_1.csv").write_text("t_s,q1_rad,Kraft_für_F", "latin-1") and None,
         "line 1: found byte 0xfc, allowed UTF-8 text (Latin-1 or Windows-1252 text? Save it as UTF-8)"),
     "a trial as a data set": (("identify", "data/trials/slow_1.csv"), nothing, "slow_1.csv: file: found a trial, allowed the folder of its data set, with dataset.toml (that is data)"),
-    "a data set that is not there": (("identify", "nowhere", "-o", "out"), nothing, "nowhere: file: found No such file"),
+    "a data set that is not there": (("identify", "nowhere", "-o", "out"), nothing, "nowhere: no such file"),
     # movements
     "movement with another number of joints": (
         MOVE, lambda f: f.edit("movement.toml", "[[-60, 60]", "[[-60, 60, 0]"), "movement.toml: movement.waypoints_deg: found"),
@@ -270,7 +270,7 @@ def test_a_full_disk_is_said_of_the_file_that_was_asked_for(
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["identify", "nope"], "nope: file: found No such file or directory, allowed a folder with dataset.toml, or that file"),
+        (["identify", "nope"], "nope: no such file, allowed a folder with dataset.toml, or that file"),
         (["identify", "data", "--metod", "joint"], "(see armrs identify --help)"),
         (["fmu", "export", "data/model.toml", "--fmi", "1"], "'1' is not one of '2', '3' (see armrs fmu export --help)"),
         (["nonsense"], "(see armrs --help)"),
@@ -349,7 +349,7 @@ def four_segments() -> armrs.Model:
         (lambda: armrs.simulate(true_model(), duration=0.1, rate=5e-324), "rate: found 5e-324, allowed a finite number >= 0.001 Hz"),
         (lambda: armrs.simulate(true_model(), duration=0.1, sensors=armrs.Sensors(), seeds=range(10**12)), "seeds: found 1000000000000"),
         (lambda: armrs.simulate(true_model(), duration=0.1, start=np.zeros(3)), "start angles: found 3 values, allowed 2"),
-        (lambda: passive_moments("nowhere"), "nowhere: file: found No such file or directory"),
+        (lambda: passive_moments("nowhere"), "nowhere: no such file"),
     ],
 )
 def test_functions_refuse_with_the_argument(call: Callable[[], object], message: str) -> None:

@@ -70,8 +70,8 @@ def test_a_page_loads_nothing_and_is_well_formed(results: Path, verb: str) -> No
 def test_the_identification_in_words(results: Path) -> None:
     text = " ".join(Page((results / "identify/report.html").read_text(encoding="utf-8")).text)
     for part in (
-        "Synthetic data: simulated, not measured", "(first table). Of the", "unknowns the movements show", "Decided by data: it rests on the measurement.", "Decided by prior: it rests on the model as given",
-        "What cannot be told apart", "Calibration of the sensors", "What is left", "How to repeat", "armrs identify", "--with coulomb", f"{_armrs.build_profile} build",
+        "Synthetic data: simulated, not measured", "(first table). Of the", "The movements determine ", " independent combinations of the segment", "Decided by data: determined by the measurement.", "Decided by prior: determined by the model as given",
+        "What cannot be distinguished", "Calibration of the sensors", "What is left", "How to repeat", "armrs identify", "--with coulomb", f"{_armrs.build_profile} build",
         "3 fit trials: ", "1 test trial, which no fit has seen: ", "kg m²",
     ):  # fmt: skip
         assert part in text, part

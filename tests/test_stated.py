@@ -61,7 +61,7 @@ def test_the_worth_of_an_effect_is_told_in_units_of_the_scatter() -> None:
     """A share of what is explained was 0 % in most rows of the table of an arm without laws."""
     found = {"effects": [effect(), effect(without=None)], "lack_of_fit": {"amended": {"ratio": 1.21}}}
     table = words.missing(found)
-    assert table.head[2] == "off without it" and [row[2] for row in table.rows] == ["3.4", "–"]
+    assert table.head[2] == "residual without the effect" and [row[2] for row in table.rows] == ["3.4", "–"]
     assert "With every effect it is 1.1." in words.worth(found)
     unrepeated = {"effects": [effect(without=None)], "lack_of_fit": {"amended": {"ratio": None}}}
     assert words.missing(unrepeated).rows[0][2] == "< 1 %" and "Share: " in words.worth(unrepeated)

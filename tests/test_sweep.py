@@ -360,7 +360,7 @@ def test_the_bootstrap_of_a_case(source: Path) -> None:
         ("cases = 5", "cases = 5.0", "cases: found 5.0"),
         ("seed = 5", "seed = -1", "seed: found -1"),
         ('experiment = "EXPERIMENT.toml"', "", "found neither, allowed one of them"),
-        ('experiment = "EXPERIMENT.toml"', 'experiment = "gone.toml"', "gone.toml: file: found No such file"),
+        ('experiment = "EXPERIMENT.toml"', 'experiment = "gone.toml"', "gone.toml: no such file"),
         ('experiment = "EXPERIMENT.toml"', 'experiment = "EXPERIMENT.toml"\ndataset = "."', "found both, allowed one of them"),
         ("range = [0.9, 1.1]", "range = [1.1, 0.9]", "range: found [1.1, 0.9], allowed low and high, low first"),
         ("range = [0.9, 1.1]", "range = [0.9, nan]", "range[1]: found nan"),

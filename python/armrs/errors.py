@@ -7,6 +7,8 @@ import os
 from collections.abc import Iterable
 from typing import Any
 
+WRITABLE = "a place that can be written"
+"""What is allowed where a file or folder cannot be made."""
 _ALIKE = 0.5
 """Least similarity of names, from 0 to 1, at which one is suggested for the other."""
 
@@ -72,9 +74,8 @@ class BadInput(ArmrsError, ValueError):
         )
 
     def __str__(self) -> str:
-        where = ": ".join(one_line(part) for part in (self.file, self.place) if part)
-        found = self.found if isinstance(self.found, Text) else show(self.found)
-        text = f"{where}: found {found}, allowed {one_line(self.allowed)}"
+        where, said = _worded(self.place, self.found, self.allowed)
+        text = ": ".join(one_line(part) for part in (self.file, where, said) if part)
         return f"{text} ({one_line(self.hint)})" if self.hint else text
 
 
@@ -152,6 +153,36 @@ class CoupledError(ArmrsError):
 
 class Text(str):
     """A description of what was found, printed as it is and not as a quoted value."""
+
+
+class Sentence(Text):
+    """What is wrong in a sentence of its own: printed without place and `found`; what is allowed then says what to do."""
+
+
+NO_FILE = Text("no such file")
+_NO_FILE = (NO_FILE, "No such file or directory")
+_READABLE = ("that can be read", "a file that exists")
+"""Ends of what is allowed that say no more than that the file should be there."""
+_OF_TRIALS = {
+    "configuration": "the name of the movement, shared by its repeats",
+    "file": "the file of the samples",
+    "repeat": "the number of the repeat of its movement",
+    "role": "fit or test",
+}
+"""Required keys of a trial with their meaning."""
+
+
+def _worded(place: str, found: object, allowed: str) -> tuple[str, str]:
+    """Return the place and what is wrong there: what is missing in words of its own, all else as found and allowed."""
+    table, _, key = place.rpartition(", ")
+    if isinstance(found, Sentence):
+        return "", f"{found}; {allowed}"
+    if found == "nothing" and allowed == f"key {key} is required":
+        meaning = _OF_TRIALS.get(key) if table.startswith("[[trial]]") else None
+        return "", f"`{key}` is missing{f' in {table}' if table else ''}{f': {meaning}' if meaning else ''}"
+    if key == "file" and found in _NO_FILE and allowed != WRITABLE:
+        return table, NO_FILE if allowed.endswith(_READABLE) else f"{NO_FILE}, allowed {allowed}"
+    return place, f"found {found if isinstance(found, Text) else show(found)}, allowed {allowed}"
 
 
 def not_utf8(place: str, raw: bytes, error: UnicodeDecodeError, *, file: str | os.PathLike[str] | None = None) -> BadInput:

@@ -45,7 +45,7 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
     A contraction as long as the whole trial cannot be seen this way: that needs the activity of a known effort to compare with.
     """
     if not any(trial.emg for trial in trials):
-        return Check("muscles silent", None, "No muscle activity was recorded: the muscles are assumed to have been silent.")
+        return Check("muscles silent", None, "No muscle activity was recorded: the muscles are assumed inactive.")
     worst: tuple[float, str, str, float] = (0.0, "", "", 0.0)
     for trial in trials:
         width = max(1, round(WINDOW * trial.rate))

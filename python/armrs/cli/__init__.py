@@ -71,7 +71,7 @@ def _version(wanted: bool) -> None:
 def _root(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and end.")] = False,
 ) -> None:
-    """Identify a passive planar arm that a robot moves by the hand.
+    """Identify a passive planar arm whose hand a robot guides.
 
     Simulate the experiment, identify the arm, and find the effects that the model lacks. SI units and radians unless a name says otherwise.
 
@@ -81,7 +81,7 @@ def _root(
 
 for _verb, _line in _VERBS.items():
     app.command(_verb.__name__.rstrip("_").replace("_", "-"), short_help=_line)(_verb)
-app.add_typer(fmu.app, name="fmu", short_help="Export the arm for other tools; look at a unit, check it.")
+app.add_typer(fmu.app, name="fmu", short_help="Export the arm as an FMU; inspect and check FMUs.")
 
 
 def _listed_only() -> None:

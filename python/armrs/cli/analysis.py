@@ -175,19 +175,30 @@ def gap(
     with kept(history, result, day, plain):
         written = write_gap(result, plain, folder) if folder else []
         console.warn([*data.warnings, *result.warnings])
-        step = after_gap(plain, dataset, folder)
+        step = after_gap(plain, dataset, folder, data)
         present(lambda: plain, json, lambda: words.show(plain, written), step)
     return 1 if result.verdict == "unexplained" else 0
 
 
-def after_gap(result: Mapping[str, Any], dataset: Path, folder: Path | None) -> str:
-    """Return the next step after a search."""
+def after_gap(result: Mapping[str, Any], dataset: Path, folder: Path | None, data: Dataset) -> str:
+    """Return the next step after a search: a page for the clinician only where the arm is that of a person."""
+    from ..model import Subject
+
     if folder is None:
         return f"armrs gap {quoted(dataset)} -o gap writes a report with figures, and the amended model"
     if result["verdict"] == "unexplained":
         shown = "when and in which channel the gap is open" if result["open"] else "where model and data disagree"
         return f"{folder / 'report.html'} shows {shown}; armrs check {quoted(dataset)} lists problems of the recordings"
-    return f"armrs report {quoted(folder / 'gap.json')} --summary -o clinic writes one page in plain words"
+    if data.subject != Subject() or data.muscles:
+        return f"armrs report {quoted(folder / 'gap.json')} --summary -o clinic writes one page in plain words"
+    if not result["effects"]:
+        return f"armrs identify {quoted(dataset)} -o identified"
+    shown = f"{folder / 'report.html'} shows the gap before and after"
+    driven = next((t for t in (*data.test_trials, *data.trials) if t.robot_q is not None or t.tau is not None), None)
+    if driven is None or data.folder is None:
+        return shown
+    amended, trial = quoted(folder / "amended.toml"), quoted(data.folder / driven.file)
+    return f"{shown}; armrs simulate {amended} --trial {trial} -o simulated simulates a trial with the amended model"
 
 
 def passive(

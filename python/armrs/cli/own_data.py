@@ -330,7 +330,7 @@ def check(context: typer.Context, dataset: Source, json: JsonFile = None) -> int
             print(f"{problem.level}: {problem}")
         if done.problems:
             print()
-        console.table(("verb", "can", "why"), [(v.verb, "yes" if v.able else "no", v.why) for v in done.verbs], left=3)
+        console.table(("verb", "can use the data", "why"), [(v.verb, "yes" if v.able else "no", v.why) for v in done.verbs], left=3)
 
     present(data, json, human, _after_check(done, dataset))
     return 1 if done.errors else 0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..errors import BadInput, Text
+from ..errors import BadInput, Sentence, Text
 from . import files
 from .dataset import FILE, describe, described_model, name_of, output_names
 from .samples import NUMBER, SUFFIXES, csv_place, explain_csv, header_of, parquet_table, write_table
@@ -79,7 +79,7 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     content = description.replace(name=name_of(described, description), model="model.toml" if named else None, trials=entries).to_toml()
 
     if (out / FILE).exists() and (out / FILE).read_bytes() != content.encode("utf-8"):
-        raise BadInput("folder", Text("another data set"), "a folder of its own", file=out)
+        raise BadInput("folder", Sentence("this folder holds another data set"), files.ANOTHER, file=out)
 
     def write(part: Path) -> list[Path]:
         written = [_write(_job(source, part / name)) for source, name in zip(sources, names, strict=True)]

@@ -15,14 +15,14 @@ import numpy as np
 
 from .. import checks
 from ..anthropometry import literature_model
-from ..errors import ArmrsError, BadInput, BadInputs, Text, nearest
+from ..errors import NO_FILE, ArmrsError, BadInput, BadInputs, Text, nearest
 from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, TrialEntry, load_model
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
 from ..telling import telling
 from . import files
 from .faults import faults_of
 from .muscle_activity import joint_activity, mark_activity
-from .samples import NO_FILE, SUFFIXES, write_samples
+from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
 FILE = "dataset.toml"
@@ -358,7 +358,7 @@ def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     try:
         return path, Description.load(path)
     except BadInput as first:
-        raise BadInputs.of(faults_of(path) or [first]) from None
+        raise BadInputs.of(faults_of(path).found or [first]) from None
 
 
 def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: str | None = None) -> Path:

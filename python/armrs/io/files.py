@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-from ..errors import BadInput, Text
+from ..errors import WRITABLE, BadInput, Sentence, Text
 
 PathLike = str | os.PathLike[str]
 
@@ -28,6 +28,7 @@ _HEAD = 2000
 """Bytes of a page that contain its maker."""
 _COMPLETE = ".complete"
 """Suffix of a folder whose files are all written and on their way to their places."""
+ANOTHER = "choose another -o"
 _SCRATCH = re.compile(r"armrs-.*?(?P<host>\w+)-(?P<process>\d+)-.*")
 
 
@@ -138,7 +139,7 @@ def _write_whole(target: Path, folder: PathLike, write: Callable[[Path], list[Pa
         recover(near)
         temporary = Path(tempfile.mkdtemp(prefix=_unfinished(target.resolve().name), suffix=".part", dir=near))
     except FileExistsError:
-        raise BadInput("file", Text("Not a directory"), "a place that can be written", file=folder) from None
+        raise BadInput("file", Text("Not a directory"), WRITABLE, file=folder) from None
     except (OSError, ValueError) as error:
         raise _unwritable(folder, error) from None
     try:
@@ -238,8 +239,8 @@ def refuse_page_of_another(path: Path, maker: str | None) -> None:
     there = _maker(path) if path.is_file() else None
     if there == maker or not path.is_file() or path.stat().st_size == 0:
         return
-    found = "a page that armrs did not make" if there is None else f"the report of armrs {there}"
-    raise BadInput("file", Text(found), "a folder of its own: another -o DIR", file=path)
+    found = "a page that armrs did not make" if there is None else f"a report of armrs {there}"
+    raise BadInput("file", Sentence(f"this folder holds {found}"), ANOTHER, file=path)
 
 
 def _outdated(temporary: Path, target: Path, page: Path, written: list[Path]) -> list[Path]:
@@ -252,8 +253,7 @@ def _outdated(temporary: Path, target: Path, page: Path, written: list[Path]) ->
     if not (target / page).is_file():
         for path in (target / name for name in written if name.is_relative_to(page.parent)):
             if path.exists():
-                found = f"a file that armrs {maker} did not write: no report is beside it"
-                raise BadInput("file", Text(found), "a folder of its own: another -o DIR", file=path)
+                raise BadInput("file", Sentence(f"armrs {maker} did not write this file"), ANOTHER, file=path)
         return []
     numbered = {_NUMBERED.sub(r"\1*\2", n.name) for n in written if n.parent == page.parent and _NUMBERED.fullmatch(n.name)}
     former = [*there.glob("figures/*.png"), *there.glob("figures/*.json"), *(path for form in numbered for path in there.glob(form))]
@@ -366,9 +366,9 @@ def must_be_writable(path: PathLike) -> None:
     except (OSError, ValueError) as error:
         raise _unwritable(path, error) from None
     if there != target and not there.is_dir():
-        raise BadInput("file", Text("Not a directory"), "a place that can be written", file=path)
+        raise BadInput("file", Text("Not a directory"), WRITABLE, file=path)
     if not os.access(there, os.W_OK):
-        raise BadInput("file", Text("Permission denied"), "a place that can be written", file=path)
+        raise BadInput("file", Text("Permission denied"), WRITABLE, file=path)
 
 
 def not_an_input(outputs: list[Path], inputs: list[Path]) -> None:
@@ -408,4 +408,4 @@ def _umask() -> int:
 
 def _unwritable(path: PathLike, error: Exception) -> BadInput:
     reason = getattr(error, "strerror", None) or "a name no file can have"
-    return BadInput("file", Text(reason), "a place that can be written", file=path)
+    return BadInput("file", Text(reason), WRITABLE, file=path)

@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, Text, not_utf8, show
+from ..errors import NO_FILE, BadInput, Text, not_utf8, show
 from .files import may_replace, replacing
 
 SUFFIXES = (".csv", ".parquet")
 MOST_COLUMNS = 4096
-NO_FILE = Text("no such file")
 NUMBER = "a finite number, or an empty cell where the sample is missing"
 
 

@@ -50,7 +50,7 @@ def problems(result: Mapping[str, Any]) -> list[str]:
 
 def abilities(result: Mapping[str, Any]) -> Table:
     """Return what each verb can do with the data."""
-    return Table(["verb", "can", "why"], [[v["verb"], "yes" if v["able"] else "no", v["why"]] for v in result["verbs"]], 3)
+    return Table(["verb", "can use the data", "why"], [[v["verb"], "yes" if v["able"] else "no", v["why"]] for v in result["verbs"]], 3)
 
 
 def channels(result: Mapping[str, Any]) -> Table:

@@ -92,7 +92,7 @@ def arm(model: Model, trials: Sequence[Trial], measured: Sequence[tuple[int, str
     figure = plotting.figure(7.0, 3.2 + 0.2 * min(len(measured), 11))
     marked = {("joint", joint - 1) for joint, _ in measured}
     sketch(model, trials, marked, [(f"{joint}  {said}", plotting.INK) for joint, said in measured], figure.subplots())
-    seen = "; ".join(said for _, said in measured[:MOST_CONFIGURATIONS]) or "no law of a joint rests on the measurement"
+    seen = "; ".join(said for _, said in measured[:MOST_CONFIGURATIONS]) or "no law of a joint is determined by the measurement"
     more = len(measured) - MOST_CONFIGURATIONS
     seen += f"; and {more} more, in the tables" if more > 0 else ""
     text = f"The arm in the middle of its movements, g is the direction of gravity. Marked joints are those with a measured law: {seen}."
@@ -118,8 +118,9 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
             plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], figure.add_subplot(rows[row, 0]))
     plotting.interval_legend(figure, unique)
     text = (
-        f"Bars are {100 * level:g} % intervals. A full marker rests on the measurement. A hollow one does not: where the movements leave a "
-        "value open it is that of the model as given, moved only as far as the combinations that are measured ask for."
+        f"Bars are {100 * level:g} % intervals. A value with a full marker is determined by the measurement. One with a hollow marker is "
+        "not: where the movements leave a value open it is that of the model as given, moved only as far as the combinations that are "
+        "measured ask for."
     )
     return Drawn("parameters", "Parameters with intervals", text, figure)
 

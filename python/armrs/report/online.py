@@ -82,7 +82,7 @@ def _estimates(result: Replay) -> Drawn:
             ax.tick_params(labelbottom=True)
     for ax in axes[len(result.estimates) :]:
         ax.remove()
-    text = "Bands are twice the standard deviation. Blue where the data decide the value; grey where it rests on the model or on a bound."
+    text = "Bands are twice the standard deviation. Blue where the data decide the value; grey where the model or a bound does."
     return Drawn("estimates", "What was learned", text, figure)
 
 

@@ -31,7 +31,11 @@ BESIDE_RED = tuple(colour for colour in MANY if colour != RED)
 MARKERS = {"data": (BLUE, "full"), "prior": (GREY, "none"), "bound": (RED, "none")}
 """What decided a value -> colour and fill of its marker."""
 _SHAPES = {"data": "o", "prior": "o", "bound": "D"}
-_MEANING = {"data": "decided by the measurement", "prior": "rests on the model, not on these data alone", "bound": "at a physical limit"}
+_MEANING = {
+    "data": "decided by the measurement",
+    "prior": "determined by the model, not by these data alone",
+    "bound": "at a physical limit",
+}
 
 _STYLE: dict[str, Any] = {
     "font.size": 10.0,

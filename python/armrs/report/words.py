@@ -35,7 +35,7 @@ DEPENDENCE_MEANING = (
     "(upper and lower: its moment at that end; steepness: how fast it rises), a straight line (stiffness), a coupling (change with the "
     "adjacent angle) and a constant (moment). 95 % intervals are in brackets; a term of zero is not needed. If this law, which is linear "
     "in the adjacent angle, is not enough, each end moves with the adjacent angle as well: by minus its ratio for each degree of it. The "
-    "mean coupling is that of the linear law; a small p speaks for a coupling, or against the linear law."
+    "mean coupling is that of the linear law; a small p indicates a coupling, or an error of the linear law."
 )
 
 INTERVALS = (
@@ -95,7 +95,7 @@ def _identified(result: Mapping[str, Any]) -> str:
         counts.append(f"a physical limit {by.count('bound')}")
     ending = "" if result["status"] == "solved" else f" The solver ended {result['status']}: take the values with care."
     if any(e.get("caveat") for e in (*result["parameters"], *result["combinations"])):
-        ending += " The speeds are largely noise: what rests on the measurement is off by more than its intervals say."
+        ending += " The speeds are largely noise: what is determined by the measurement is off by more than its intervals say."
     shown = tables.measured(result)
     measured = tables.how_many(len(shown), "quantity", "quantities") + (" (first table)" if shown else "")
     return f"Measured: {measured}. Of the {len(by)} parameters, {', '.join(counts)}.{ending}"
@@ -183,7 +183,7 @@ def data_lines(data: Mapping[str, Any]) -> list[str]:
 def decided_lines(items: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the meaning of the words for what decided these estimates."""
     present = {e["decided_by"] for e in items}
-    return [f"Decided by {key}: it rests on {meaning}." for key, meaning in tables.DECIDED_BY.items() if key in present]
+    return [f"Decided by {key}: determined by {meaning}." for key, meaning in tables.DECIDED_BY.items() if key in present]
 
 
 def check_lines(result: Mapping[str, Any]) -> list[str]:
@@ -201,8 +201,8 @@ def cannot_tell(result: Mapping[str, Any]) -> list[str]:
 
 
 def independent(result: Mapping[str, Any]) -> str:
-    """Describe how many unknowns the movements determine."""
-    return f"of {result['unknowns']} unknowns the movements show {result['rank']} independent combinations"
+    """Describe how much of the segments and joints the movements determine."""
+    return f"the movements determine {result['rank']} independent combinations of the segment and joint parameters"
 
 
 def _trade(line: str, units: Mapping[str, str]) -> str:
@@ -230,7 +230,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
     lines = cannot_tell(result)
     if lines:
-        print(f"What cannot be told apart: {independent(result)}.")
+        print(f"What cannot be distinguished: {independent(result)}.")
         print("\n".join(f"  {line}" for line in lines))
     if not data["test"]["trials"]:
         print("No test trials: nothing was checked on data that no fit has seen.")
@@ -252,7 +252,10 @@ def followed(result: Mapping[str, Any]) -> None:
 
 
 def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
-    """Print what the demonstration came to."""
+    """Print what the demonstration came to: the result of the search, where the report is, and then the details."""
+    print(verdict(result))
+    files_written(written[-1:])
+    print()
     print("\n".join(result["story"]))
     print()
     show(result["comparison_text"], tables.comparison(result))
@@ -261,12 +264,9 @@ def demo(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     print()
     print("The slow movements alone do not separate all effects:")
     print("\n".join(f"  {line}" for line in result["slow_alone"]["lines"]))
-    print()
-    print(verdict(result))
     sessions = [path.parent for path in written if path.name == "dataset.toml"]
     if sessions:
-        print(f"Go on with: armrs identify {sessions[0]} --with coulomb, or armrs gap {sessions[-1]}")
-    files_written(written[-1:])
+        print(f"\nGo on with: armrs identify {sessions[0]} --with coulomb, or armrs gap {sessions[-1]}")
 
 
 def simulated(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:

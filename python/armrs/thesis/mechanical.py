@@ -279,7 +279,7 @@ def without_brakes() -> Found:
             "0.005."
         ),
         why=(
-            "m2 and m1·l1 cannot be told apart by a slow movement (rank 2 of 3); printed values of m2 repeat where the search began or "
+            "m2 and m1·l1 cannot be distinguished by a slow movement (rank 2 of 3); printed values of m2 repeat where the search began or "
             "ended: 1.207, 1.206 and 1.204 kg in three experiments, with deviations of 0.001. Here they are what was handed over, 10 % too "
             "heavy, moved only as far as the sum asks, and called prior. Equation 3.32 is the mean size of the noise, 0.8 of its "
             "deviation, where there is no friction; the thesis' 0.003 and 0.008 N m are its noise. The printed −76.3 % and 73.3 % divide "

@@ -169,7 +169,7 @@ def small_movements() -> Found:
         rows[-1].append(f"{1e3 * np.linalg.norm(hand[-1] - hand[0]):.0f}")
     rows = [[*row, *[None] * (6 - len(row))] for row in rows]
     return Found(
-        ours="The same ranges. The last column but one says how badly gravity (cos θ) and a constant passive moment can be told apart.",
+        ours="The same ranges. The last column but one says how badly gravity (cos θ) and a constant passive moment can be distinguished.",
         why=(
             "Within so few degrees the cosine is all but constant: a condition number of 100 means that a hundredth of the torque as noise "
             "moves weight and passive moment by their whole size. This is why the thesis had to hold τ_p near zero for the mechanical arm, "

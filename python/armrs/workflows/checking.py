@@ -17,7 +17,8 @@ from .. import checks
 from ..analysis.passivity_checks import SLOW
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..io import plausibility
-from ..io.dataset import NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
+from ..io.dataset import FILE, NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
+from ..io.faults import faults_of
 from ..io.samples import NUMBER, header_of
 from ..io.trial import Reading, Trial, moving_bases, still_angles
 from ..model import Description, Model, TrialEntry
@@ -128,12 +129,13 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     tell("reading", 0.0)
     described = _caught(lambda: describe(source), problems)
     if described is None:
+        _despite_faults(Path(source), problems)
         return Checked(
             tuple(problems), tuple(Ability(verb, False, "the data set cannot be read") for verb in ("identify", "passive", "gap"))
         )
     path, description = described
     model = _caught(lambda: described_model(path.parent, description), problems)
-    trials = _trials(path.parent, description, model, problems)
+    trials = _trials(path.parent, description, description.trials, model, problems)
     if model is None or not trials:
         why = "no model" if model is None else "no trial can be read"
         return Checked(tuple(problems), tuple(Ability(verb, False, why) for verb in ("identify", "passive", "gap")))
@@ -162,6 +164,19 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     return Checked(_feasible(dict.fromkeys(_not_implied(problems)), whole), _abilities(whole, blocked, bool(other)), whole)
 
 
+def _despite_faults(source: Path, problems: list[Problem]) -> None:
+    """Add the problems of model and trial files where faults of `dataset.toml` leave them to be read."""
+    path = source / FILE if source.is_dir() else source
+    try:
+        faults = faults_of(path)
+    except BadInput:  # it is among the problems
+        return
+    if faults.rest is not None:
+        rest = faults.rest
+        model = _caught(lambda: described_model(path.parent, rest), problems) if faults.names_model else None
+        _trials(path.parent, rest, faults.trials, model, problems)
+
+
 def _caught(read: Callable[[], Any], problems: list[Problem]) -> Any:
     """Return what `read` returns, or None with its refusal among the problems, each once."""
     try:
@@ -186,9 +201,9 @@ _FILES = {
 
 
 def _remedy(error: ArmrsError) -> str:
-    """Return the next step about an error."""
+    """Return the next step about an error; nothing where the error itself says it."""
     if not isinstance(error, BadInput):
-        return "correct the file that it names"
+        return ""
     if (error.hint or error.allowed).endswith("or that file") or "no data set" in str(error.found):
         return "give the folder that armrs import, record or demo wrote"
     if str(error.found).startswith(("no column for", "neither forces nor torques")):
@@ -212,7 +227,7 @@ def _remedy(error: ArmrsError) -> str:
         return "write one row with the names of the columns, then one row of numbers a sample; armrs import reads other tables"
     if of_samples and place.startswith(("column", "row", "Fy", "q", "angles")):
         return "correct the column: its unit, its sign, or its values"
-    return "correct it in the file that it names"
+    return ""
 
 
 _WARNINGS = (
@@ -232,7 +247,7 @@ _WARNINGS = (
     ("no movement was repeated", "record repeats of each movement"),
     ('role = "test"', 'set role = "test" for one repeat of each movement'),
     ("hardly", "move the joint, or give its law in the model"),
-    ("what holds it cannot be told", "move the joint, or give its law in the model"),
+    ("what holds it cannot be determined", "move the joint, or give its law in the model"),
     ("a joint that is held", "nothing, if the joint was held; else repair its sensor"),
     ("begin them at one", "cut the trials at a rest"),
     ("at a higher rate", "record the robot at a higher rate, or let it start and stop smoothly"),
@@ -296,9 +311,12 @@ def _warned(text: str) -> Problem:
     return Problem("warning", text, step)
 
 
-def _trials(folder: Path, description: Description, model: Model | None, problems: list[Problem]) -> list[Trial]:
+def _trials(
+    folder: Path, description: Description, entries: Iterable[TrialEntry], model: Model | None, problems: list[Problem]
+) -> list[Trial]:
+    """Return the trials of some entries that can be read; what is wrong with the others is added to the problems."""
     trials = []
-    for entry in description.trials:
+    for entry in entries:
         path = folder / entry.file
         if model is not None:
             joints: int | None = model.n_joints

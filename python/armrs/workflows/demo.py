@@ -342,16 +342,16 @@ def search_verdict(gap: GapFound) -> str:
 
 
 def of_slow_movements(slow: GapFound) -> list[str]:
-    """Return what the slow movements alone can determine, a line for each named effect."""
-    lines = []
+    """Return what the slow movements alone separate, a line for each effect that is named: first those that they do not separate."""
+    torn, separated = [], []
     for effect in gap_data(slow)["effects"]:
         rivals = dict.fromkeys(a["kind"] for a in effect["alternatives"] if a["joint"] == effect["joint"])
         name = effect_name(effect, [j.name for j in slow.dataset.model.joints])
         if rivals:
-            lines.append(f"{name}: cannot be told from {joined([title(kind) for kind in rivals], 'or')} by these movements")
+            torn.append(f"{name}: cannot be distinguished from {joined([title(kind) for kind in rivals], 'or')} by these movements")
         else:
-            lines.append(f"{name}: no other effect explains the movements as well")
-    return lines
+            separated.append(f"{name}: no other effect explains the movements as well")
+    return torn + separated
 
 
 def _demo_data(made: Demonstration, rows: list[dict[str, Any]], gaps: list[list[float]], command: str | None) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..catalogue import catalogue
-from ..errors import ArmrsError, BadInput, Text
+from ..errors import ArmrsError, BadInput, Sentence, Text
 from ..io import files
 from ..io.dataset import FILE, Dataset, write_dataset
 from ..io.markers import Markers, planar_motion
@@ -532,7 +532,7 @@ def _former(out: Path) -> set[Path]:
     if not (out / FILE).exists():
         return set()
     if not (out / "truth" / "truth.toml").is_file():
-        raise BadInput("folder", Text("a data set that armrs record did not write"), "a folder of its own", file=out)
+        raise BadInput("folder", Sentence("this folder holds a data set that armrs record did not write"), files.ANOTHER, file=out)
     names = [name for entry in Description.load(out / FILE).trials if (name := Path(entry.file)).parent == Path("trials")]
     markers = {out / "markers" / name.with_suffix(".trc").name for name in names}
     return {out / name for name in names} | markers | {out / "wrench" / name.name for name in names}

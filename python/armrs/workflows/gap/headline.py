@@ -30,6 +30,8 @@ MEANINGS = {
     "Mx": "the contact moment",
 }
 """What a channel measures, by its name without the number."""
+TIE = 10.0
+"""Difference of twice the log-likelihood up to which two laws explain the data as well: odds of 150."""
 _CLOSES = 0.9
 """Share of an open gap above its floor that names close at least where they are what the model lacks, as they do on judgement seeds; where
 something outside the catalogue is missing, false names close up to three quarters (docs/gap.md)."""
@@ -188,11 +190,14 @@ def undecided(effect: Mapping[str, Any], joints: Sequence[str] = ()) -> str:
     families = {family(e["kind"]) for e in stated}
     kinds = joined([title(e["kind"]) for e in stated], "or")
     where = _trial(effect)
+    if better := [e for e in effect["alternatives"] if (e.get("worse") or 0.0) < -TIE]:
+        closer = joined([title(e["kind"]) if len(here) == 1 else effect_name(e, joints) for e in better], "or")
+        return effect_name(effect, joints) + f"{where} (rarer, but closer to the data: {closer})"
     if len(here) > 1:
-        return joined([effect_name(e, joints) for e in stated], "or") + f"{where}, which these movements cannot tell apart"
+        return joined([effect_name(e, joints) for e in stated], "or") + f"{where}, which these movements cannot distinguish"
     if len(families) == 1 and (name := _FAMILIES.get(families.pop())):
-        return effect_name({**effect, "kind": name}, joints) + f"{where} ({kinds}: not told apart)"
-    return effect_name({**effect, "kind": kinds}, joints) + f"{where}, which these movements cannot tell apart"
+        return effect_name({**effect, "kind": name}, joints) + f"{where} ({kinds}: not distinguished)"
+    return effect_name({**effect, "kind": kinds}, joints) + f"{where}, which these movements cannot distinguish"
 
 
 def _trial(effect: Mapping[str, Any]) -> str:

@@ -73,7 +73,7 @@ class Calibrated:
         Lack of fit, ratio and z; NaN without repeats.
     suspects : tuple of Suspect
         Every effect that was tested, alone and to first order, the likeliest first. One that gains more than its price may be there;
-        nothing was converged, and several of them may be one.
+        nothing was converged, and several may have one cause.
     """
 
     result: _armrs.Screening = field(repr=False)

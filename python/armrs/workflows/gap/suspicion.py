@@ -61,9 +61,11 @@ def _few_trials(dataset: Dataset, led: bool) -> list[str]:
     lines = []
     fit = dataset.fit_trials
     if len(fit) == 1:
-        lines.append("one fit trial only: what is noise and what is missing cannot be told apart by repeats")
+        lines.append("one fit trial only: what is noise and what is missing cannot be distinguished by repeats")
     elif len({t.configuration for t in fit}) == len(fit):
-        lines.append("no movement was repeated: what is noise and what is missing cannot be told apart; names after the first are guesses")
+        lines.append(
+            "no movement was repeated: what is noise and what is missing cannot be distinguished; names after the first are guesses"
+        )
     if not dataset.test_trials:
         lines.append('no trial with role = "test": the gap cannot be measured on data that no fit has seen')
     return lines
@@ -124,8 +126,8 @@ def _still_joints(dataset: Dataset, led: bool) -> list[str]:
         return []
     moved = _armrs.reach(_armrs.Rig(dataset.model), core_trials(dataset), core_settings(dataset, led, 1))
     return [
-        f"joint {j + 1} moves by {reach:.2g} rad in the fit trials: what holds it cannot be told; where the model states no law for it the "
-        "simulation holds it, and amended.toml has no law for it either"
+        f"joint {j + 1} moves by {reach:.2g} rad in the fit trials: what holds it cannot be determined; where the model states no law for "
+        "it the simulation holds it, and amended.toml has no law for it either"
         for j, reach in enumerate(moved)
         if reach <= _armrs.STILL
     ]

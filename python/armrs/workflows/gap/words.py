@@ -12,14 +12,12 @@ from ...report import tables
 from ...report import words as common
 from ...report.tables import Table, digits, number, smallest_effects, spread, with_interval
 from . import headline
-from .headline import effect_name, joined
+from .headline import TIE, effect_name, joined
 
 verdict = headline.headline
 """The result in one sentence."""
 _TELLS = 5.0
 """Standard deviations from which on a movement distinguishes two effects."""
-_BETTER = 10.0
-"""Units of twice the log-likelihood from which an alternative explains more or less, and not just as much."""
 
 
 def size(effect: Mapping[str, Any]) -> str:
@@ -102,12 +100,15 @@ def others(result: Mapping[str, Any]) -> list[str]:
 def tie(result: Mapping[str, Any]) -> str:
     """Return by how much alternatives may explain the data less and still not be distinguished."""
     worse = [a.get("worse") or 0.0 for effect in result["effects"] for a in effect["alternatives"]]
-    beyond = ", or by no more than the possible error of the named law" if max(worse, default=0.0) > _BETTER else ""
-    rare = " One that explains them better is not named, because few joints have it." if min(worse, default=0.0) < -_BETTER else ""
-    return (
-        f"These explain the data as well, or less by up to {_BETTER:.0f} units of twice the log-likelihood{beyond}: on these movements "
-        f"they cannot be told apart.{rare}"
-    )
+    beyond = ", or by no more than the possible error of the named law" if max(worse, default=0.0) > TIE else ""
+    sentences = [
+        f"These explain the data as well, or less by up to {TIE:.0f} units of twice the log-likelihood{beyond}: on these movements they "
+        "cannot be distinguished."
+    ]
+    if min(worse, default=0.0) < -TIE:
+        rare = "One that explains them better is not named, because few joints have it."
+        sentences = [rare] if max(worse) < -TIE else [*sentences, rare]
+    return " ".join(sentences)
 
 
 def _separating(alternative: Mapping[str, Any]) -> str:
@@ -116,7 +117,7 @@ def _separating(alternative: Mapping[str, Any]) -> str:
     if separation is None:
         return ""
     now, then = (digits(separation[key], 2) for key in ("now", "then"))
-    if (alternative.get("worse") or 0.0) > _BETTER:
+    if (alternative.get("worse") or 0.0) > TIE:
         now += ", which the error of the named law may cause"
     best = alternative["separating_movement"]
     if separation["then"] < _TELLS:
@@ -128,7 +129,7 @@ def _how(alternative: Mapping[str, Any]) -> str:
     worse = alternative.get("worse")
     if worse is None:
         return str(alternative["why"])
-    if abs(worse) < 0.1 or -_BETTER < worse < 0.0:
+    if abs(worse) < 0.1 or -TIE < worse < 0.0:
         return str(alternative["why"])
     size = f"{abs(worse):{'.0f' if abs(worse) >= 10.0 else '.2g'}}"
     return f"{alternative['why']}, by {size} units {'less' if worse > 0.0 else 'more'}"
@@ -191,7 +192,7 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     if result["verdict"] == "nothing_missing":
         common.show("The smallest effects that these data would have shown", smallest_effects(result["would_have_seen"]))
     common.followed(result)
-    common.files_written(written[-1:])
+    common.files_written([path for path in written if path.parent.name != "figures"])
 
 
 def quick(result: Mapping[str, Any]) -> None:
@@ -204,7 +205,7 @@ def quick(result: Mapping[str, Any]) -> None:
     elif len(worth) == 1:
         said = f"{effect_name(worth[0])} may be missing"
     else:
-        said = f"{len(worth)} effects may be missing, and several of them may be one; {effect_name(worth[0])} explains most"
+        said = f"{len(worth)} effects each improve the fit; several may have one cause; {effect_name(worth[0])} explains most"
     noise = ""
     if z is not None and not math.isnan(z):
         more = "more" if z >= MISFIT else "no more"
@@ -251,7 +252,7 @@ def missing(data: Mapping[str, Any]) -> Table:
             std = value["std"] and factor * value["std"]
             ends = None if std is None else " … ".join(number(factor * end, std) for end in value["interval"])
             rows.append([*head, name, number(factor * value["value"], std), spread(std), ends, held_in])
-    head = ["effect", "at", "off without it" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"]
+    head = ["effect", "at", "residual without the effect" if repeated else "share", "parameter", "value", "± std", "95 % interval", "unit"]
     if all(row[6] is None for row in rows):  # nothing has an interval: there are no columns for it
         head, rows = [*head[:5], head[7]], [[*row[:5], row[7]] for row in rows]
     return Table(head, rows, 4)
@@ -273,8 +274,8 @@ def worth(data: Mapping[str, Any]) -> str:
         return "Share: the part of all that is explained which would be lost if this one effect were left out and everything else refitted."
     with_all = data["lack_of_fit"]["amended"]["ratio"] ** 0.5
     return (
-        "Off without it: RMS residual if this one effect were left out and everything else refitted, in units of what repeats differ by. "
-        f"With every effect it is {digits(with_all, 2)}. Disturbances of one trial have no such number."
+        "Residual without the effect: RMS residual if this one effect were left out and everything else refitted, in units of what "
+        f"repeats differ by. With every effect it is {digits(with_all, 2)}. Disturbances of one trial have no such number."
     )
 
 

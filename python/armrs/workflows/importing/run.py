@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ... import checks
-from ...errors import BadInput, BadInputs, Text, unknown_name
+from ...errors import BadInput, BadInputs, Sentence, Text, unknown_name
 from ...io import files
 from ...io.dataset import load_dataset
 from ...io.raw import RawTable
@@ -503,10 +503,10 @@ def _former(folder: Path, replaced: bool) -> set[str]:
     if not (folder / "dataset.toml").exists():
         return set()
     if not (folder / FILE).is_file():
-        raise BadInput("-o", Text("a data set that armrs import did not write"), "a folder of its own", file=folder)
+        raise BadInput("-o", Sentence("this folder holds a data set that armrs import did not write"), files.ANOTHER, file=folder)
     if not replaced:
-        allowed = "a folder of its own, or --force, which replaces it whole, with all that was edited in it"
-        raise BadInput("-o", Text("the data set of a former import"), allowed, file=folder)
+        instead = f"{files.ANOTHER}, or --force, which replaces it whole, with all that was edited in it"
+        raise BadInput("-o", Sentence("this folder holds the data set of a former import"), instead, file=folder)
     return {_name_of(trial) for trial in load_recipe(folder / FILE).trials}
 
 
