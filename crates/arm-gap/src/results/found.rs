@@ -127,11 +127,11 @@ impl GapResult {
             .collect();
         let amended = Fitted::of(&finding.amended.hypothesis);
         let unknowns = finding.precision.coordinates.iter();
-        let refitted_far = stopped(
+        let (given, hypothesis) = (
             (asked.model, asked.force_on_robot),
             &finding.amended.hypothesis,
-            unknowns.clone(),
         );
+        let refitted_far = stopped(given, hypothesis, unknowns.clone());
         Ok(Self {
             verdict,
             places: Vec::new(),
@@ -144,11 +144,7 @@ impl GapResult {
             },
             effects,
             looks_like: None,
-            absorbed: absorbed(
-                (asked.model, asked.force_on_robot),
-                &finding.amended.hypothesis,
-                unknowns,
-            ),
+            absorbed: absorbed(given, hypothesis, unknowns),
             lack: finding.lack.each_ref().map(Lack::from),
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
             warnings: held_in_motion(prepared.session)

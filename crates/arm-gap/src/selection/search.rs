@@ -53,21 +53,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             progress("looking at single trials", 0.05)?;
             settled = self.set_apart(settled, &mut apart)?;
         }
-        if led && settled.0.leaves_much() {
-            // Before other effects are named that bend to it.
-            let scale = settled.0.cost / settled.0.rows as f64;
-            apart.periodic = self.in_phase((&settled.0, &settled.1), scale);
+        if led {
+            self.slow_oscillation(&settled, &mut apart);
         }
         let mut state = self.search_from(settled, apart.periodic, progress)?;
         state = self.or_as_it_was(state, &mut apart, |all, state, apart| {
             all.with_base_reconsidered(state, apart.periodic, progress)
         })?;
         if led {
-            // One that was not named may have stood for another.
-            let swings = |c: &Candidate| c.kind().prior().nature.swings();
-            apart.periodic = apart
-                .periodic
-                .filter(|_| state.current.asked.iter().any(swings));
+            apart.keep_periodic_if_named(&state.current);
             state = self.or_as_it_was(state, &mut apart, |all, state, apart| {
                 all.rhythm_asked_again(state, apart, progress)
             })?;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use arm_core::effect::Effect;
 
 use crate::GapError;
+use crate::candidates::candidate::Candidate;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
 use crate::measurement_model::prediction::Course;
@@ -30,6 +31,13 @@ pub(crate) struct SetApart<const N: usize> {
 }
 
 impl<const N: usize> SetApart<N> {
+    /// Keeps a slow oscillation only if one is named: another may be found later then.
+    pub fn keep_periodic_if_named(&mut self, fitted: &Fitted<N>) {
+        let mut kinds = fitted.asked.iter().map(Candidate::kind);
+        let named = kinds.any(|kind| kind.prior().nature.swings());
+        self.periodic = self.periodic.filter(|_| named);
+    }
+
     /// Drops bursts that dry friction of the final model may hold.
     pub fn without_held(&mut self, effects: &[Effect<f64>]) {
         self.trial_specific.retain(|one| !is_held(one, effects));
@@ -51,6 +59,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             settled = self.calibrate_anew()?;
         }
         self.disturbances(settled, &mut apart.trial_specific, &[])
+    }
+
+    /// Looks for a slow oscillation where much is left, before effects are named that adapt to it.
+    pub(crate) fn slow_oscillation(&self, settled: &Settled<'a, N>, apart: &mut SetApart<N>) {
+        let (fitted, point) = settled;
+        if fitted.leaves_much() {
+            let scale = fitted.cost / fitted.rows as f64;
+            apart.periodic = self.in_phase((fitted, point), scale);
+        }
     }
 
     /// Tests for a rhythm again when an effect was named: the oscillation may have been that effect; the effect may have hidden a
