@@ -126,7 +126,9 @@ def identify(
         console.warn([*data.warnings, *result.warnings])
         if history is not None and not result.is_sound:
             console.warn([f"{history}: not added to the history, since the result is not sound"])
-        step = f"armrs gap {quoted(dataset)} -o gap" if result.is_sound else f"armrs check {quoted(dataset)}, and the warnings above"
+        step = f"armrs gap {quoted(dataset)} -o gap"
+        if not result.is_sound:
+            step = f"armrs check {quoted(dataset)} lists problems of the recordings; {step} looks for what the model lacks"
         present(lambda: plain, json, lambda: words.identified(plain, written), step)
     return 0 if result.is_sound else 1
 
