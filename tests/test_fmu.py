@@ -294,7 +294,7 @@ def test_export_info_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["export", "nothing.toml"], "No such file"),
+        (["export", "nothing.toml"], "no such file"),
         (["export", "arm.toml", "--start-deg", "-60"], "found 1 values, allowed 2, one a joint"),
         (["export", "arm.toml", "--start-deg", "a,b"], "allowed numbers separated by commas"),
         (["export", "arm.toml", "--start-deg", "nan,0"], "allowed finite numbers"),
@@ -302,7 +302,7 @@ def test_export_info_and_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
         (["export", "arm.toml", "-o", "arm.toml"], "an existing file with suffix '.toml'"),
         (["export", "arm.toml", "--dt", "0"], "--dt: found 0.0, allowed a finite number > 0 s"),
         (["info", "arm.toml"], "File is not a zip file"),
-        (["check", "nothing.fmu"], "No such file"),
+        (["check", "nothing.fmu"], "no such file"),
         (["info", "empty.fmu"], "no modelDescription.xml"),
     ],
 )

@@ -177,10 +177,11 @@ def _worded(place: str, found: object, allowed: str) -> tuple[str, str]:
     table, _, key = place.rpartition(", ")
     if isinstance(found, Sentence):
         return "", f"{found}; {allowed}"
-    if found == "nothing" and allowed == f"key {key} is required":
+    text = found if isinstance(found, str) else None
+    if text == "nothing" and allowed == f"key {key} is required":
         meaning = _OF_TRIALS.get(key) if table.startswith("[[trial]]") else None
         return "", f"`{key}` is missing{f' in {table}' if table else ''}{f': {meaning}' if meaning else ''}"
-    if key == "file" and found in _NO_FILE and allowed != WRITABLE:
+    if key == "file" and text in _NO_FILE and allowed != WRITABLE:
         return table, NO_FILE if allowed.endswith(_READABLE) else f"{NO_FILE}, allowed {allowed}"
     return place, f"found {found if isinstance(found, Text) else show(found)}, allowed {allowed}"
 
