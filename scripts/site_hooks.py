@@ -23,7 +23,7 @@ ELSEWHERE = {
     "equations.md": "python/armrs/thesis/equations.md",
 }
 """Pages of the site by the files that they are made of, from the root of the repository."""
-UNSOUGHT = {*ELSEWHERE, "architecture.md", "developer.md", "dossier.md"}
+UNSOUGHT = {*ELSEWHERE, "architecture.md", "developer.md", "dossier.md", "performance.md"}
 """Pages that the search leaves out: a reader's browser loads its index with the first page, and these are not what is looked for."""
 _PROSE = re.compile(r"(<(?:p|ul|ol)\b.*?</(?:p|ul|ol)>)", flags=re.S)
 _NAMED_BLOCK = re.compile(r"^```(\w+) ([^\n\"=]+)$", flags=re.M)
