@@ -2,6 +2,7 @@
 
 use arm_core::effect::{Effect, Nature, Part};
 use arm_ident::regression::trial::Trial;
+use arm_numerics::statistics::extent::extent;
 
 use crate::data::session::Session;
 use crate::data::valid_segments::SAMPLES_PER_PERIOD;
@@ -64,8 +65,9 @@ fn limits<const N: usize>(
 fn range<const N: usize>(session: &Session<N>, effect: &Effect<f64>) -> f64 {
     let first = effect.index - usize::from(effect.kind.crosses() && effect.index > 0);
     let of_joint = |j: usize| {
-        let angles = || session.trials.iter().flat_map(|t| t.q.iter().map(|q| q[j]));
-        angles().fold(f64::NEG_INFINITY, f64::max) - angles().fold(f64::INFINITY, f64::min)
+        let trials = session.trials.iter();
+        let (low, high) = extent(trials.flat_map(|t| t.q.iter().map(|q| q[j])));
+        high - low
     };
     (first..=effect.index).map(of_joint).sum()
 }

@@ -1,9 +1,9 @@
 use arm_core::effect::Kind;
-use arm_model::{Effect, Model};
+use arm_model::Effect;
 use serde::Serialize;
 
 use super::effect::sign_in_files;
-use super::placed;
+use super::{SearchInput, placed};
 use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
 
 /// A small imperfection that was refitted.
@@ -23,29 +23,29 @@ pub struct Absorbed {
 const RELATIVE: &str = "of its value";
 
 /// What was refitted of a model, from the unknowns of its fit.
-///
-/// * `model` - the model as given, and whether the forces in the files act on the robot
 pub(super) fn absorbed<'c, const N: usize>(
-    model: (&Model, bool),
+    asked: &SearchInput<'_>,
     hypothesis: &Hypothesis<N>,
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Vec<Absorbed> {
-    let modelled = (&model.0.all_effects()[..], model.1);
-    let each = unknowns.filter_map(|c| absorbed_value(modelled, hypothesis, c));
+    let modelled = asked.model.all_effects();
+    let given = (&modelled[..], asked.force_on_robot);
+    let each = unknowns.filter_map(|c| absorbed_value(given, hypothesis, c));
     each.collect()
 }
 
 /// A warning of what was refitted as far as it may be, beyond what was promised of it: what it could not take up may stand in what is
 /// named. `None` without any.
 pub(super) fn stopped<'c, const N: usize>(
-    model: (&Model, bool),
+    asked: &SearchInput<'_>,
     hypothesis: &Hypothesis<N>,
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Option<String> {
-    let modelled = (&model.0.all_effects()[..], model.1);
+    let modelled = asked.model.all_effects();
+    let given = (&modelled[..], asked.force_on_robot);
     let far = unknowns.filter(|c| c.is_at_limit(hypothesis.get(c.target)));
     let words: Vec<String> = far
-        .filter_map(|c| absorbed_value(modelled, hypothesis, c))
+        .filter_map(|c| absorbed_value(given, hypothesis, c))
         .filter(|a| a.value.abs() > a.promised)
         .map(|a| {
             let (value, promised) = (in_unit(a.value, &a.unit), in_unit(a.promised, &a.unit));
@@ -142,7 +142,17 @@ fn worded(kind: Kind, index: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use arm_model::Model;
+
     use super::*;
+
+    fn input(model: &Model, force_on_robot: bool) -> SearchInput<'_> {
+        SearchInput {
+            model,
+            force_on_robot,
+            trials: &[],
+        }
+    }
 
     /// A viscosity of 0.1 that was refitted to 0.11 with a prior of 0.005: a tenth more, where twice a twentieth is the tolerance.
     #[test]
@@ -177,7 +187,7 @@ mod tests {
             coordinate(Target::Known(1, 0), 1.0),
             coordinate(Target::Placement(0), 1.0),
         ];
-        let told = absorbed((&model, false), &hypothesis, unknowns.iter());
+        let told = absorbed(&input(&model, false), &hypothesis, unknowns.iter());
         let names: Vec<_> = told.iter().map(|a| a.name.as_str()).collect();
         let expected = [
             "mass of segment 1",
@@ -191,13 +201,19 @@ mod tests {
         assert_eq!(told[2].unit, RELATIVE);
 
         // No value is at its limit; then the place of the robot is, and alone is reported.
-        assert_eq!(stopped((&model, false), &hypothesis, unknowns.iter()), None);
+        assert_eq!(
+            stopped(&input(&model, false), &hypothesis, unknowns.iter()),
+            None
+        );
         let mut bounded = unknowns;
         (bounded[0].upper, bounded[1].upper) = (0.02, 0.003);
         // At its limit, and yet within the tolerance.
-        assert_eq!(stopped((&model, false), &hypothesis, bounded.iter()), None);
+        assert_eq!(
+            stopped(&input(&model, false), &hypothesis, bounded.iter()),
+            None
+        );
         bounded[1].prior = Some((0.0, 0.001));
-        let told = stopped((&model, false), &hypothesis, bounded.iter()).expect("a warning");
+        let told = stopped(&input(&model, false), &hypothesis, bounded.iter()).expect("a warning");
         assert!(
             told.contains("place of the robot, z by 0.0030 m (prior ± 0.0020 m, 2 σ)."),
             "{told}"
@@ -228,7 +244,7 @@ mod tests {
             step: 1e-3,
         };
         let bias = |on_robot| {
-            let told = absorbed((&model, on_robot), &hypothesis, [unknown].iter());
+            let told = absorbed(&input(&model, on_robot), &hypothesis, [unknown].iter());
             told[0].value
         };
         assert_eq!((bias(false), bias(true)), (0.3, -0.3));

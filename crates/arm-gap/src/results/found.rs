@@ -127,11 +127,7 @@ impl GapResult {
             .collect();
         let amended = Fitted::of(&finding.amended.hypothesis);
         let unknowns = finding.precision.coordinates.iter();
-        let (given, hypothesis) = (
-            (asked.model, asked.force_on_robot),
-            &finding.amended.hypothesis,
-        );
-        let refitted_far = stopped(given, hypothesis, unknowns.clone());
+        let refitted_far = stopped(asked, &finding.amended.hypothesis, unknowns.clone());
         Ok(Self {
             verdict,
             places: Vec::new(),
@@ -144,7 +140,7 @@ impl GapResult {
             },
             effects,
             looks_like: None,
-            absorbed: absorbed(given, hypothesis, unknowns),
+            absorbed: absorbed(asked, &finding.amended.hypothesis, unknowns),
             lack: finding.lack.each_ref().map(Lack::from),
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
             warnings: held_in_motion(prepared.session)
@@ -289,11 +285,7 @@ impl Screening {
         let nuisances = prepared.session.nuisances();
         Ok(Self {
             model: Fitted::of(hypothesis).amended(asked.model, &[])?,
-            absorbed: absorbed(
-                (asked.model, asked.force_on_robot),
-                hypothesis,
-                nuisances.iter(),
-            ),
+            absorbed: absorbed(asked, hypothesis, nuisances.iter()),
             gap: channel_gaps(&trials, (N, led), Version::Calibrated),
             lack: Lack::from(&look.lack),
             suspects: look.suspects.iter().map(Suspect::of).collect(),

@@ -94,8 +94,7 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Opti
     let highest = HIGHEST.min(0.45 * rate);
     let count = ((highest - lowest) / step) as usize;
     let frequency = |k: usize| lowest + step * k as f64;
-    let of_channel = |c: usize| trials.iter().map(|t| tapered(&t[c])).collect();
-    let all: Vec<Vec<Vec<f64>>> = (0..channels).map(of_channel).collect();
+    let all = by_channel(trials, channels);
     let mut best: Option<(f64, f64)> = None;
     for channel in &all {
         let power: Vec<f64> = (0..count)
@@ -127,7 +126,13 @@ pub fn line(trials: &[&Vec<Vec<f64>>], rate: f64, lowest: f64, sum: Sum) -> Opti
         }
     }
     let (_, near) = best?;
-    peak(trials, rate, (near, step), sum)
+    peak_of(&all, rate, (near, step), sum)
+}
+
+/// Each channel of every trial, tapered.
+fn by_channel(trials: &[&Vec<Vec<f64>>], channels: usize) -> Vec<Vec<Vec<f64>>> {
+    let of_channel = |c: usize| trials.iter().map(|t| tapered(&t[c])).collect();
+    (0..channels).map(of_channel).collect()
 }
 
 /// The frequency near another at which all channels together have most power \[Hz\]; `None` without trials.
@@ -140,15 +145,18 @@ pub fn peak(
     sum: Sum,
 ) -> Option<f64> {
     let channels = trials.first()?.len();
-    let of_channel = |c: usize| trials.iter().map(|t| tapered(&t[c])).collect();
-    let all: Vec<Vec<Vec<f64>>> = (0..channels).map(of_channel).collect();
+    peak_of(&by_channel(trials, channels), rate, (near, apart), sum)
+}
+
+/// The peak of tapered channels; see [`peak`].
+fn peak_of(all: &[Vec<Vec<f64>>], rate: f64, (near, apart): (f64, f64), sum: Sum) -> Option<f64> {
     let square = |t: &Vec<f64>| t.iter().map(|v| v * v).sum::<f64>();
     let size = |channel: &Vec<Vec<f64>>| channel.iter().map(square).sum::<f64>();
     let sizes: Vec<f64> = all.iter().map(|c| size(c).max(f64::MIN_POSITIVE)).collect();
     // The peak of all channels together, on a finer grid.
     let total = |f: f64| -> f64 {
         let share = |(channel, size): (&Vec<_>, &f64)| sum.power(channel, (f, rate)) / size;
-        std::iter::zip(&all, &sizes).map(share).sum()
+        std::iter::zip(all, &sizes).map(share).sum()
     };
     let fine = 0.1 * apart;
     let around = (-10..=10).map(|k| near + fine * f64::from(k));
