@@ -52,7 +52,7 @@ impl<const N: usize> Session<N> {
         /// The hand is where it must be to a millionth of what it was off by.
         const STEPS: usize = 3;
         let mut q = course.start(hypothesis);
-        let effects = hypothesis.effects();
+        let effects = at_rest(&hypothesis.effects());
         if N <= 2 || !effects.iter().any(is_set_valued_friction) {
             return Ok(q);
         }
@@ -105,7 +105,8 @@ impl<const N: usize> Session<N> {
         let through = joint_force(&chain, &pose, (&zero, &zero), force);
         let motion = Motion::new(0.0, q, zero).with_joint_force(&through);
         let most = Joints::from(dry_friction(&effects, &motion, &[]));
-        let held = held_at_start(&most);
+        let holding = Joints::from(dry_friction(&at_rest(&effects), &motion, &[]));
+        let held = held_at_start(&holding);
         let needed = static_torque(&chain, &pose, force, moment)
             - inverse_dynamics(&chain, &pose, &zero, &zero)
             - resisting_besides_dry(&effects, &motion, &[]);
@@ -127,10 +128,12 @@ impl<const N: usize> Session<N> {
         experiment: &Experiment<N>,
     ) -> Result<Start<N>, SimulationError> {
         let (near, friction) = self.at_start(hypothesis, course)?;
-        if friction.iter().all(|&torque| torque == 0.0) {
+        let mut resting = experiment.clone();
+        resting.effects = at_rest(&experiment.effects);
+        let creeps = resting.effects != experiment.effects;
+        if !creeps && friction.iter().all(|&torque| torque == 0.0) {
             return Ok(Start::Equilibrium { near });
         }
-        let mut resting = experiment.clone();
         resting.start = Start::Equilibrium { near };
         resting.duration = resting.dt;
         resting.output_interval = None;
@@ -228,6 +231,18 @@ fn turning_most<const N: usize>(moving: &SMatrix<f64, 2, N>) -> Vec<usize> {
     joints
 }
 
+/// Effects as they act on joints at rest: dry friction that creeps below some speed holds a joint like friction that sticks. With 0.1 N m at
+/// 0.01 rad/s, a spring of 1 N m/rad takes 10 s to turn it back.
+pub(crate) fn at_rest(effects: &[Effect<f64>]) -> Vec<Effect<f64>> {
+    let mut resting = effects.to_vec();
+    for effect in resting.iter_mut().filter(|e| e.parameters[0] > 0.0) {
+        if let Some(smoothing) = effect.kind.smoothed_by() {
+            effect.parameters[smoothing] = 0.0;
+        }
+    }
+    resting
+}
+
 /// Whether an effect is set-valued dry friction that acts.
 pub(crate) fn is_set_valued_friction(effect: &Effect<f64>) -> bool {
     effect.on && effect.is_dry() && effect.parameters[0] > 0.0
@@ -282,5 +297,37 @@ mod tests {
             off[0].abs() < 1e-4 && off[2].abs() > 10.0 * off[0].abs(),
             "{off}"
         );
+    }
+
+    /// Three segments with a spring in the last joint that turns it by 0.54 rad where nothing holds it.
+    #[test]
+    fn a_joint_that_creeps_starts_where_it_is_measured() {
+        let segment = |length: f64| Segment {
+            length,
+            mass: 1.0,
+            com: [0.5 * length, 0.0],
+            inertia: 0.01,
+        };
+        let segments = [0.3, 0.25, 0.08].map(segment);
+        let chain = Chain::new(segments, [0.0; 2], [0.0; 2]).expect("an arm");
+        let measured = Joints::from([-1.05, 1.03, 0.16]);
+        let at = tip(&chain, &Pose::new(&measured));
+        let trial = Trial {
+            handle: Some(vec![at; 50]),
+            force_on_arm: Some(vec![[0.0; 2]; 50]),
+            ..Trial::new(100.0, vec![measured; 50])
+        };
+        let mut session = of_one(chain, trial);
+        let spring = Effect::new(Kind::Elastic, 2).with(&[0.3, 0.7]);
+        let mut start = |friction: &[f64]| {
+            session.effects = vec![spring, Effect::new(Kind::Coulomb, 2).with(friction)];
+            let course = session.course(0).expect("a course");
+            let run = session.run(&session.given(), &course).expect("a run");
+            run.recording().q[2]
+        };
+        let sticking = start(&[0.2, 0.0]);
+        assert!((sticking - measured[2]).abs() < 1e-3, "{sticking}");
+        assert!((start(&[0.2, 0.01]) - sticking).abs() < 1e-6);
+        assert!((start(&[0.0, 0.01]) - 0.7).abs() < 0.05);
     }
 }

@@ -170,8 +170,9 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         let (line, zero) = (self.line, Joints::zeros());
         let (state, error) = (&line.states[0], line.error(0));
         let moved = |angle: &Joints<f64, N>| state.moved(angle, &zero, &zero);
-        let there = |angle: &Joints<f64, N>| balance(self.plant, &moved(angle), hand, memory);
-        if !self.dry {
+        let resting = self.plant.at_rest();
+        let there = |angle: &Joints<f64, N>| balance(&resting, &moved(angle), hand, memory);
+        if !(self.dry || resting.dry) {
             let missing = |angle: &Joints<f64, N>| {
                 let there = there(angle);
                 (error - there.torque, there)

@@ -92,7 +92,7 @@ impl<const N: usize> Linear<'_, N> {
     ) -> Result<Channels, SimulationError> {
         let plant = Plant::new(self.session, &asked.changed, &self.course.rhythms)?;
         let nowhere = [Joints::<f64, N>::zeros(); 2];
-        let start = match origin.plant.dry || plant.dry {
+        let start = match origin.plant.dry || plant.dry || origin.plant.at_rest().dry {
             true => self.start_from(origin, &plant, &asked.changed)?,
             false => nowhere,
         };
@@ -127,8 +127,11 @@ impl<const N: usize> Linear<'_, N> {
         changed: &Hypothesis<N>,
     ) -> Result<[Joints<f64, N>; 2], SimulationError> {
         let (near, friction) = origin.start;
-        let most = plant.friction(&self.balances[0].motion, &[]);
-        let held = held_at_start(&most);
+        let motion = &self.balances[0].motion;
+        let held = match plant.dry {
+            true => held_at_start(&plant.friction(motion, &[])),
+            false => origin.held_at_start(motion),
+        };
         let (place, resisted) = self.session.at_start(changed, &self.course)?;
         let moved = place - near;
         Ok([

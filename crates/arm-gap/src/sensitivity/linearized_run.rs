@@ -11,7 +11,6 @@ use std::sync::{Arc, OnceLock};
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course, smooth};
-use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::origin::Origin;
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;
@@ -135,11 +134,9 @@ impl<'a, const N: usize> Linear<'a, N> {
         for i in 0..linear.states.len() {
             linear.differentiate(i, memories.get(i).map_or(&[], Vec::as_slice));
         }
+        let held = linear.own.held_at_start(&linear.balances[0].motion);
         linear.rest = linear.slopes.first().map_or_else(SMatrix::zeros, |slopes| {
-            inverse_of_free(
-                &slopes.stiffness,
-                &held_at_start(&linear.balances[0].friction),
-            )
+            inverse_of_free(&slopes.stiffness, &held)
         });
         linear.own.shown = linear.sensed((&linear.own, &linear.own.plant), None, None);
         Ok(linear)

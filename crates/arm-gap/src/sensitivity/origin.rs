@@ -2,9 +2,11 @@
 
 use std::sync::OnceLock;
 
+use arm_core::effect::Motion;
 use arm_core::{Joints, Plane};
 
 use crate::measurement_model::prediction::Channels;
+use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::plant::{Balance, Plant};
 
 /// A hypothesis from which changes are computed: that of the run, or one beside it.
@@ -29,5 +31,10 @@ impl<const N: usize> Origin<N> {
             delayed_force: OnceLock::new(),
             balances: OnceLock::new(),
         }
+    }
+
+    /// The joints that dry friction holds where the run starts.
+    pub(super) fn held_at_start(&self, motion: &Motion<f64, N>) -> [bool; N] {
+        held_at_start(&self.plant.at_rest().friction(motion, &[]))
     }
 }

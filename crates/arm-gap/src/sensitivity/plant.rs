@@ -10,7 +10,7 @@ use arm_sim::SimulationError;
 use crate::data::session::Session;
 use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::Course;
-use crate::measurement_model::start::is_set_valued_friction;
+use crate::measurement_model::start::{at_rest, is_set_valued_friction};
 
 /// What moves a led arm, besides its own state.
 pub(super) struct Plant<const N: usize> {
@@ -58,6 +58,17 @@ impl<const N: usize> Plant<N> {
             resisting: Vec::new(),
             sensing: Vec::new(),
             dry: false,
+            ..*self
+        }
+    }
+
+    /// The same with joint effects as they act at rest.
+    pub fn at_rest(&self) -> Self {
+        let resting = at_rest(&self.resisting);
+        Self {
+            dry: resting.iter().any(is_set_valued_friction),
+            resisting: resting,
+            sensing: Vec::new(),
             ..*self
         }
     }
