@@ -24,6 +24,8 @@ pub(crate) struct Rest {
     pub left_out: Vec<bool>,
     /// Observable force where it is not both components.
     pub told: Arc<Vec<ObservableForce>>,
+    /// By joint, where it rests in a measured motion; nothing is listed where the motion is simulated.
+    pub joints: Vec<Vec<bool>>,
 }
 
 /// A session made ready.
@@ -194,7 +196,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for i in 0..self.courses.len() {
             let trial = &self.session.trials[i];
             let rest = self.resting.get(self.group_of[i]).cloned();
-            let Rest { mut left_out, told } = rest.unwrap_or_default();
+            let Rest {
+                mut left_out, told, ..
+            } = rest.unwrap_or_default();
             left_out.resize(trial.len(), false);
             for (k, flag) in left_out.iter_mut().enumerate() {
                 *flag |= self.is_left_out(i, k as f64 / trial.rate);

@@ -9,10 +9,14 @@ use crate::data::prepared_session::{PreparedSession, Rest};
 use crate::data::session::ComparisonMode;
 use crate::data::valid_segments::{ObservableForce, ValidSegments, widened};
 use crate::measurement_model::hypothesis::Hypothesis;
+use crate::measurement_model::prediction::Course;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
-/// Share of the samples that must be left when those at which joints with dry friction rest are left out.
-const LEAST_LEFT: f64 = 0.15;
+/// Share of the samples that must be left when those at which joints with dry friction rest are left out: of a simulated motion, which sticks as
+/// well, half, since whole movements are lost otherwise, and laws that they alone determine;
+const LEAST_LEFT: f64 = 0.5;
+/// of a measured one, which says nothing of friction at rest.
+const LEAST_LEFT_OF_MEASURED: f64 = 0.15;
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// Leaves out what dry friction makes unknowable where its joint rests or reverses: there friction is whatever holds it.
@@ -32,7 +36,12 @@ impl<const N: usize> PreparedSession<'_, N> {
         };
         let before = compared(self);
         self.cut();
-        if (compared(self) as f64) < LEAST_LEFT * before as f64 {
+        self.mark_rest();
+        let least = match self.session.comparison {
+            ComparisonMode::Led => LEAST_LEFT,
+            ComparisonMode::Torque => LEAST_LEFT_OF_MEASURED,
+        };
+        if (compared(self) as f64) < least * before as f64 {
             // Then some joint rests at any time, and imperfect samples are better than none.
             self.compare_rest();
         }
@@ -44,6 +53,12 @@ impl<const N: usize> PreparedSession<'_, N> {
         self.leaves_out_rest() && dry_joints(hypothesis) == [false; N]
     }
 
+    /// Whether nothing is compared at a sample of a movement because a joint with dry friction rests there.
+    pub(crate) fn is_at_rest(&self, group: usize, sample: usize) -> bool {
+        let rest = self.resting.get(group);
+        rest.is_some_and(|rest| rest.left_out.get(sample) == Some(&true))
+    }
+
     /// Whether samples are left out because a joint rests there.
     pub(crate) fn leaves_out_rest(&self) -> bool {
         !self.resting.is_empty()
@@ -53,6 +68,27 @@ impl<const N: usize> PreparedSession<'_, N> {
     pub(crate) fn compare_rest(&mut self) {
         self.resting.clear();
         self.cut();
+        self.mark_rest();
+    }
+
+    /// Marks in measured motions where friction holds joints.
+    fn mark_rest(&mut self) {
+        for (course, group) in std::iter::zip(&mut self.courses, &self.group_of) {
+            let joints = self
+                .resting
+                .get(*group)
+                .map_or(&[][..], |rest| &rest.joints);
+            let count = course.raw.first().map_or(0, Vec::len);
+            let own = |joint: &Vec<bool>| {
+                let mut own = joint.clone();
+                own.resize(count, false);
+                own
+            };
+            let at_rest: Vec<Vec<bool>> = joints.iter().map(own).collect();
+            if course.at_rest != at_rest {
+                Arc::make_mut(course).at_rest = at_rest;
+            }
+        }
     }
 
     /// What is found when no sample is left out because a joint rests there.
@@ -71,9 +107,12 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// and nowhere else. A longer arm moves under it, and nothing is known then.
     fn rest(&self, point: &LinearizationPoint<N>, group: usize) -> Rest {
         let course = &self.courses[self.references[group]];
+        if self.session.compares_contact_torques() {
+            return self.rest_in_motion(point, group);
+        }
         let joints: Vec<Vec<bool>> = (0..N)
             .map(|j| match self.dry[j] {
-                true => widened(&self.resting_joint(point, (group, j)), course),
+                true => widened(&self.resting_joint(point, (course, group, j)), course),
                 false => vec![false; course.seen[0].len()],
             })
             .collect();
@@ -97,14 +136,35 @@ impl<const N: usize> PreparedSession<'_, N> {
                     _ => ObservableForce::Neither,
                 };
                 Rest {
-                    left_out: Vec::new(),
                     told: Arc::new((0..count).map(told).collect()),
+                    ..Rest::default()
                 }
             }
             _ => Rest {
                 left_out: (0..count).map(|i| !held(i).is_empty()).collect(),
-                told: Arc::default(),
+                ..Rest::default()
             },
+        }
+    }
+
+    /// What the rest of joints with dry friction takes from the comparison of a movement that was measured: the samples at which one of them
+    /// rests in some repeat. What friction holds there is part of both sides of the low-pass, so its neighbours are compared.
+    fn rest_in_motion(&self, point: &LinearizationPoint<N>, group: usize) -> Rest {
+        let repeats = std::iter::zip(&self.courses, &self.group_of);
+        let repeats: Vec<_> = repeats.filter(|(_, g)| **g == group).collect();
+        let count = repeats.iter().map(|(c, _)| c.seen[0].len()).max();
+        let mut joints = vec![vec![false; count.unwrap_or(0)]; N];
+        for (j, joint) in joints.iter_mut().enumerate().filter(|(j, _)| self.dry[*j]) {
+            for (course, _) in &repeats {
+                let own = self.resting_joint(point, (course, group, j));
+                std::iter::zip(joint.iter_mut(), own).for_each(|(rests, own)| *rests |= own);
+            }
+        }
+        let rests = |i: usize| joints.iter().any(|joint| joint[i]);
+        Rest {
+            left_out: (0..joints[0].len()).map(rests).collect(),
+            told: Arc::default(),
+            joints,
         }
     }
 
@@ -112,12 +172,14 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn resting_joint(
         &self,
         point: &LinearizationPoint<N>,
-        (group, j): (usize, usize),
+        (course, group, j): (&Course<N>, usize, usize),
     ) -> Vec<bool> {
         /// Share of its fastest speed below which a joint rests, the speed below which it always does, and the one above
         /// which it never does \[rad/s\].
         const SLOW: (f64, f64, f64) = (0.25, 0.005, 0.03);
-        let course = &self.courses[self.references[group]];
+        /// Share of its fastest speed that the low-pass of a measured motion may leave at rest: less than that in the middle of a rest as
+        /// long as a period of its cutoff, between two strokes of 0.3 s or more.
+        const SMEARED: f64 = 0.1;
         let speed = |i: usize| match (course.motion(), point.lines.get(group)) {
             (Some(motion), _) => motion.qd[i][j].abs(),
             (None, Some(line)) => line.state(i).1[j].abs(),
@@ -125,7 +187,12 @@ impl<const N: usize> PreparedSession<'_, N> {
         };
         let speeds: Vec<f64> = (0..course.seen[0].len()).map(speed).collect();
         let fastest = speeds.iter().copied().fold(0.0, f64::max);
-        let limit = (SLOW.0 * fastest).clamp(SLOW.1, SLOW.2);
+        let mut limit = (SLOW.0 * fastest).clamp(SLOW.1, SLOW.2);
+        if let Some(motion) = course.motion()
+            && self.session.compares_contact_torques()
+        {
+            limit = limit.max(SMEARED * fastest).max(motion.rest[j]);
+        }
         let mut rest: Vec<bool> = speeds.into_iter().map(|v| v <= limit).collect();
         if self.session.comparison == ComparisonMode::Torque {
             // A joint that reverses on the way does not rest: the law of its friction holds through zero.
@@ -170,8 +237,13 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
 mod tests {
     use arm_core::effect::{Effect, Kind};
 
+    use arm_core::models;
+    use arm_ident::regression::trial::Trial;
+
     use super::*;
+    use crate::data::noise::Noise;
     use crate::measurement_model::hypothesis::tests::plain;
+    use crate::measurement_model::prediction::tests::of_one;
 
     fn with(known: Vec<Effect<f64>>) -> Hypothesis<2> {
         Hypothesis { known, ..plain() }
@@ -193,5 +265,40 @@ mod tests {
         assert_eq!(of("viscous", &[0.5]), [false; 2]);
         assert_eq!(of("elastic", &[2.0, 1.0]), [false; 2]);
         assert_eq!(dry_joints(&with(Vec::new())), [false; 2]);
+    }
+
+    /// Strokes of a second about a pause of 0.3 s, in which the second joint is held by what nobody knows.
+    #[test]
+    fn what_friction_holds_in_a_measured_motion_is_what_was_measured() {
+        let stroke = |t: f64| {
+            let s = t.clamp(0.0, 1.0);
+            s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+        };
+        let angle = |t: f64| stroke(t - 0.5) - stroke(t - 1.8);
+        let times = || (0..330).map(|i| f64::from(i) / 100.0);
+        let q = times().map(|t| arm_core::Joints::from([0.0, 1.0 + angle(t)]));
+        let trial = Trial {
+            force_on_arm: Some(times().map(|t| [libm::sin(9.0 * t), 2.0]).collect()),
+            ..Trial::new(100.0, q.collect())
+        };
+        let mut session = of_one(models::mechanical_arm(), trial);
+        session.comparison = ComparisonMode::Torque;
+        session.effects = vec![Effect::new(Kind::Coulomb, 1).with(&[0.2, 0.01])];
+        let noise = Noise::unknown(session.channels()).expect("white");
+        let mut prepared = PreparedSession::with_noise(&session, noise, 1).expect("a session");
+        let point = prepared.linearize(&session.given()).expect("torques");
+        assert!(prepared.leave_out_rest(&point));
+        let course = &prepared.courses[0];
+        let (pause, stroke) = (165, 100);
+        assert!(course.at_rest[1][pause] && !course.at_rest[1][stroke]);
+        assert!(!course.at_rest[0].contains(&true), "it has no friction");
+        let torques = session.torques(&session.given(), course).expect("torques");
+        assert_eq!(torques[1][pause], course.raw[1][pause]);
+        assert_ne!(torques[1][stroke], course.raw[1][stroke]);
+        let compared: Vec<usize> = prepared.valid_segments[0].samples().collect();
+        assert!(compared.iter().any(|&i| i.abs_diff(stroke) < 10));
+        assert!(!compared.iter().any(|&i| i.abs_diff(pause) < 15));
+        prepared.compare_rest();
+        assert!(prepared.courses[0].at_rest.is_empty());
     }
 }

@@ -11,7 +11,7 @@ use crate::measurement_model::hypothesis::Hypothesis;
 use crate::measurement_model::prediction::{Channels, Course};
 
 impl<const N: usize> Session<N> {
-    /// Joint torques by inverse dynamics of the measured motion.
+    /// Joint torques by inverse dynamics of the measured motion; where dry friction holds a joint, what was measured.
     ///
     /// # Errors
     /// [`SimulationError`] for a rig that cannot be.
@@ -52,8 +52,9 @@ impl<const N: usize> Session<N> {
                 }
                 None => torque,
             };
-            for (channel, value) in channels.iter_mut().zip(torque.iter()) {
-                channel.push(*value);
+            for (j, channel) in channels.iter_mut().enumerate() {
+                let is_held = course.at_rest.get(j).is_some_and(|rest| rest[i]);
+                channel.push(if is_held { course.raw[j][i] } else { torque[j] });
             }
         }
         Ok(channels)

@@ -59,6 +59,9 @@ pub struct Course<const N: usize> {
     pub(crate) start: Joints<f64, N>,
     pub(crate) start_force: Plane<f64>,
     pub(super) motion: Option<Kinematics<N>>,
+    /// By joint and sample, where dry friction holds a joint of a measured motion: it resists with whatever the measured torque is.
+    /// Nothing is listed where nothing is held.
+    pub(crate) at_rest: Vec<Vec<bool>>,
     /// What the sensors read of hand and contact, where torques are compared that the contact exerts.
     pub(super) contact: Option<ContactReadings<N>>,
 }
@@ -168,6 +171,7 @@ impl<const N: usize> Session<N> {
             start,
             start_force,
             motion,
+            at_rest: Vec::new(),
             contact,
         })
     }

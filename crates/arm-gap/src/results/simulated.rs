@@ -95,6 +95,9 @@ impl SimulatedTrial {
             for (k, counted) in trial.counted.iter_mut().enumerate() {
                 *counted &= !prepared.is_left_out(i, k as f64 / course.rate);
             }
+            if session.compares_contact_torques() {
+                trial.leave_out_rest(prepared);
+            }
             let own = plays
                 .iter()
                 .map(|(version, beliefs)| (*version, &beliefs[i]));
@@ -105,6 +108,19 @@ impl SimulatedTrial {
             trial
         };
         prepared.parallel(prepared.courses.len(), one)
+    }
+
+    /// Leaves out what joints with dry friction hold at rest, where enough is left: along a measured motion nothing says what that is.
+    fn leave_out_rest<const N: usize>(&mut self, prepared: &PreparedSession<'_, N>) {
+        /// Shortest time that is enough \[s\].
+        const ENOUGH: f64 = 1.0;
+        let each = self.counted.iter().enumerate();
+        let moving: Vec<bool> = each
+            .map(|(k, counted)| *counted && !prepared.is_at_rest(self.group, k))
+            .collect();
+        if moving.iter().filter(|m| **m).count() as f64 >= ENOUGH * self.rate {
+            self.counted = moving;
+        }
     }
 
     /// What a version shows.

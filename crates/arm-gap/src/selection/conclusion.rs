@@ -5,6 +5,7 @@ use arm_core::effect::{Effect, Place};
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::prepared_session::PreparedSession;
+use crate::data::session::ComparisonMode;
 use crate::measurement_model::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
@@ -88,7 +89,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             (amended.hypothesis, precision) = (hypothesis, known);
         }
         apart.without_held(&amended.hypothesis.effects());
-        self.courses = std::mem::take(&mut apart.measured);
+        if self.session.comparison == ComparisonMode::Led {
+            self.courses = std::mem::take(&mut apart.measured);
+        }
         let in_trials = self.in_every_trial((&mut calibrated, &mut amended), &mut apart)?;
         for law in base {
             named.push(self.name(law, &mut amended, &mut precision));
