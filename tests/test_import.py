@@ -284,9 +284,9 @@ def test_a_recording_becomes_the_true_data_set(case: str, recording: Recording, 
 
 def test_a_group_of_hdf5_is_a_trial(recording: Recording, tmp_path: Path) -> None:
     done = armrs.import_recordings([hdf5_groups(recording, tmp_path)], tmp_path / "session", model=KNOWN)
-    trials = armrs.load_dataset(done.folder).trials
-    assert [(t.configuration, t.repeat, len(t)) for t in trials] == [("slow", 1, len(recording.t)), ("slow", 2, len(recording.t) + 1)]
-    for trial in trials:
+    written = armrs.load_dataset(done.folder).trials
+    assert [(t.configuration, t.repeat, len(t)) for t in written] == [("slow", 1, len(recording.t)), ("slow", 2, len(recording.t) + 1)]
+    for trial in written:
         assert np.abs(trial.q[: len(recording.t)] - recording.q).max() <= 1e-12
 
 
@@ -297,8 +297,8 @@ def test_a_struct_of_matlab_is_a_trial_as_a_group_of_hdf5_is(within: bool, recor
 
     r = recording
     fields = {"t": r.t, "q": r.q, "Fy": r.force_on_robot[:, 0], "Fz": r.force_on_robot[:, 1]}
-    trials = {"slow_1": fields, "slow_2": {name: column[:-1] for name, column in fields.items()}}
-    savemat(tmp_path / "session.mat", {"session": trials} if within else trials)
+    both = {"slow_1": fields, "slow_2": {name: column[:-1] for name, column in fields.items()}}
+    savemat(tmp_path / "session.mat", {"session": both} if within else both)
     done = armrs.import_recordings([tmp_path / "session.mat"], tmp_path / "session", model=KNOWN)
     found = armrs.load_dataset(done.folder).trials
     assert [(t.configuration, t.repeat, len(t)) for t in found] == [("slow", 1, len(r.t)), ("slow", 2, len(r.t) - 1)]

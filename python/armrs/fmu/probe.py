@@ -183,13 +183,13 @@ def _advance(trial: Trial, slave: ImportedSlave, time: float, size: float) -> di
         trial.find(place, f"lastSuccessfulTime is {done.last_successful_time:g} s after a step to {end:g} s")
     if done.event and not trial.flag("hasEventMode"):
         trial.find(place, "it requests event handling but has no event mode")
-    values = trial.outputs(slave)
-    for name, found in values.items():
+    outputs = trial.outputs(slave)
+    for name, found in outputs.items():
         for value in found:
             if isinstance(value, float) and not math.isfinite(value):
                 trial.find(f"variable {name}", f"is {value} after a step", sort="finite")
     _time(trial, slave, end)
-    return values
+    return outputs
 
 
 def _time(trial: Trial, slave: ImportedSlave, end: float) -> None:

@@ -251,10 +251,10 @@ def _demonstrate(out: Path, command: str | None, tell: Callable[[str, float], No
     tell("passive moments", 3 / 7)
     passive = passive_moments(dataset)
     tell("identifying the model as it was handed over", 4 / 7)
-    plain = identify(dataset, with_effects=())
+    as_given = identify(dataset, with_effects=())
     tell("identifying with what was found", 5 / 7)
     found = identify(dataset, with_effects=found_in_joints(gap))
-    made = Demonstration(truth, found, plain, passive, gap, slow, (description, second))
+    made = Demonstration(truth, found, as_given, passive, gap, slow, (description, second))
     tell("writing the report", 6 / 7)
     return dataclasses.replace(made, files=(description, second, *_write(out, made, command)))
 
