@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.coupled import Coupled
+from armrs.cosim.coupled_run import Coupled
+from armrs.cosim.error_estimate import run_checked
 from armrs.cosim.master import run_system
-from armrs.cosim.ready import Ready
+from armrs.cosim.sources_and_controllers import Ready
 from armrs.cosim.system import System, couple
 from armrs.errors import CoupledError
 from armrs.model import load_model

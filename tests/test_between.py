@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.between import outliers, parts
-from armrs.cosim.coupled import Coupled
-from armrs.cosim.imported import ImportedSlave
-from armrs.cosim.isolated import IsolatedSlave
+from armrs.cosim.coupled_run import Coupled
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.haptic_wall import Wall
+from armrs.cosim.intermediate_outputs import outliers, parts
 from armrs.cosim.master import run_system
-from armrs.cosim.partner import Partner, Status
-from armrs.cosim.ready import Ready, Wave
+from armrs.cosim.sources_and_controllers import Ready, Wave
 from armrs.cosim.system import System, couple
-from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
+from armrs.fmu.imported_slave import ImportedSlave
+from armrs.fmu.isolated_slave import IsolatedSlave
+from armrs.fmu.slave_interface import Partner, Status
 from armrs.model import load_model
 from pythonfmu_builds import built
 

@@ -14,16 +14,16 @@ import pytest
 
 from armrs import Contact, Joint, Model, _armrs, cli
 from armrs.cosim import Partner, Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.coupled import Coupled
-from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.coupled_run import Coupled
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.fmu_export import export_fmu
+from armrs.cosim.haptic_wall import Wall
 from armrs.cosim.master import run_system
-from armrs.cosim.partner import StepResult, Variable
-from armrs.cosim.ready import Ready
+from armrs.cosim.sources_and_controllers import Ready
 from armrs.cosim.system import couple, load_system
-from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
-from armrs.fmu.export import export_fmu
+from armrs.fmu.imported_slave import ImportedSlave
+from armrs.fmu.slave_interface import StepResult, Variable
 from armrs.model import Segment, load_model
 from armrs.workflows.simulate import CoreDrive, CoreRun
 from markup import unescaped

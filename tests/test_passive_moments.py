@@ -178,8 +178,8 @@ def test_muscles_that_wake_up_are_seen() -> None:
 
 
 def test_the_result_says_it_all(session: Dataset, tmp_path: Path) -> None:
-    from armrs.report.plain import passive_data
-    from armrs.report.results import write_passive
+    from armrs.report.result_files import write_passive
+    from armrs.workflows.result_data import passive_data
 
     result = armrs.passive_moments(session)
     data = passive_data(result)

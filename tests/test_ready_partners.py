@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 from armrs import cli
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.ready import Impedance, Pid, Ready, Wave
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.sources_and_controllers import Impedance, Pid, Ready, Wave
 from armrs.cosim.system import couple, load_system
 from armrs.errors import BadInput
 from armrs.model import Contact, Joint, Model, Segment

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.coupled import Coupled
+from armrs.cosim.coupled_run import Coupled
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.haptic_wall import Wall
 from armrs.cosim.master import run_system
-from armrs.cosim.pace import Pace
-from armrs.cosim.partner import Partner
-from armrs.cosim.ready import Wave
+from armrs.cosim.sources_and_controllers import Wave
 from armrs.cosim.ssp import load_ssp
 from armrs.cosim.ssp_export import export_ssp
+from armrs.cosim.step_control import Pace
 from armrs.cosim.system import System, couple, load_system
-from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
+from armrs.fmu.slave_interface import Partner
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "cosim"
 

@@ -60,9 +60,9 @@ def fmu_export(
 
     Exports of the same model are byte-identical. The FMU contains the parameters of the arm as plain text; its token reveals edits.
     """
+    from ..cosim.fmu_export import export_fmu
     from ..cosim.slave import Slave
-    from ..fmu.export import export_fmu
-    from ..fmu.libraries import collected
+    from ..fmu.bundled_libraries import collected
     from ..workflows.stiction import too_steep_said
 
     writable(None, json)
@@ -155,13 +155,13 @@ def fmu_run(
     if the run gives no result: it is not accurate, not resolved, or diverged; the coupling created energy; the iteration did not
     converge; or a slave failed. It is 1, with samples, if a slave ended the run early or the error could not be estimated.
     """
-    from ..cosim.accuracy import run_checked
-    from ..cosim.coupled import RESULTS
+    from ..cosim.coupled_output import coupled_data, write_coupled
+    from ..cosim.coupled_run import RESULTS
+    from ..cosim.error_estimate import run_checked
     from ..cosim.master import run_system
-    from ..cosim.outcome import coupled_data, write_coupled
     from ..cosim.slave import Slave
     from ..errors import CoupledError
-    from ..report import words
+    from ..report import sentences
     from ..workflows.stiction import too_steep_said
 
     suffix = samples_suffix(to, out)
@@ -187,7 +187,7 @@ def fmu_run(
         console.warn([f"{run.verdict}, no result: {run.why}"])
     elif run.verdict == "ended":
         console.warn([run.why])
-    present(lambda: plain, json, lambda: words.coupled(plain, written))
+    present(lambda: plain, json, lambda: sentences.coupled(plain, written))
     return 0 if run.verdict == "good" or (run.verdict == "stable" and not estimate) else 1
 
 

@@ -17,7 +17,7 @@ from .common import JsonFile, OutFolder, Source, command_line, listed, on_a_term
 
 if TYPE_CHECKING:
     from ..model import Robot
-    from ..workflows.checking import Checked
+    from ..workflows.check_dataset import Checked
     from ..workflows.initialise import Worn
 
 
@@ -242,7 +242,7 @@ def import_(
     picture = write_recording(load_dataset(done.folder), done.folder)
 
     def data() -> Any:
-        from ..report.data_sets import imported_data
+        from ..report.dataset_pages import imported_data
 
         return imported_data(done, command_line(context))
 
@@ -275,7 +275,7 @@ def _joint(text: str) -> int:
 def _asked(sources: list[Path], points: tuple[str, ...], model: Path) -> str:
     """Ask which column is what, each with a guess; returns the answers as `--map` has them."""
     from ..model import load_model
-    from ..workflows.importing.questions import questions
+    from ..workflows.importing.column_questions import questions
 
     table, asked = questions(sources, points, [joint.name for joint in load_model(model).joints])
     names = [c.name for c in table.columns]
@@ -315,13 +315,13 @@ def check(context: typer.Context, dataset: Source, json: JsonFile = None) -> int
 
     Exit status 1 if a problem prevents a verb from using the data.
     """
-    from ..workflows.checking import check_dataset, grouped
+    from ..workflows.check_dataset import check_dataset, grouped
 
     with console.stages("checking") as tell:
         done = check_dataset(dataset, progress=tell)
 
     def data() -> Any:
-        from ..report.data_sets import checked_data
+        from ..report.dataset_pages import checked_data
 
         return checked_data(done, command_line(context))
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
-from .between import Between
-from .coupled import RESULTS, ConnectionReport, Coupled
-from .pace import Pace
-from .partner import Partner, Status
+from ..fmu.slave_interface import Partner, Status
+from .coupled_run import RESULTS, ConnectionReport, Coupled
+from .intermediate_outputs import Between
 from .slave import Slave
+from .step_control import Pace
 from .system import System, family, whole_range
 
 MOST_CREATED = 0.02
@@ -31,7 +31,7 @@ LITTLE = 1e-3
 
 
 def run_system(system: System, *, resolution: float = np.inf, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
-    """Run a system from zero to its duration, without an estimate of its error: `armrs.cosim.accuracy.run_checked` has one.
+    """Run a system from zero to its duration, without an estimate of its error: `armrs.cosim.error_estimate.run_checked` has one.
 
     Parameters
     ----------

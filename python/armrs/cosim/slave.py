@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import _armrs, checks
+from .. import _armrs, validation
 from ..errors import BadInput, SlaveError, Text, unknown_name
+from ..fmu.slave_interface import Partner, Status, StepResult, Variable, listed
 from ..model import Model, load_model
 from ..workflows.stiction import DEFAULT_DT
-from .partner import Partner, Status, StepResult, Variable, listed
 
 PORTS = ("force", "motion")
 
@@ -45,7 +45,7 @@ class Slave(Partner):
     Examples
     --------
     >>> from armrs.cosim import Slave
-    >>> from armrs.workflows.demo import true_model
+    >>> from armrs.demo import true_model
     >>> arm = Slave(true_model(), start=[-1.0, 0.5])
     >>> arm.enter_initialization_mode(0.0)
     >>> arm.exit_initialization_mode()
@@ -70,20 +70,20 @@ class Slave(Partner):
         name: str | None = None,
     ) -> None:
         if not isinstance(model, Model):
-            name = name or checks.path("model", model, Model).stem
-        model = checks.loaded("model", model, Model, load_model)
-        checks.choice("port", port, PORTS)
-        self.internal_step = checks.number("step", step, above=0.0, unit="s")
+            name = name or validation.path("model", model, Model).stem
+        model = validation.loaded("model", model, Model, load_model)
+        validation.choice("port", port, PORTS)
+        self.internal_step = validation.number("step", step, above=0.0, unit="s")
         self.model = model
-        self.name = checks.text("name", "arm" if name is None else name)
+        self.name = validation.text("name", "arm" if name is None else name)
         self._coupling: dict[str, Any] = {
             "name": self.name,
             "port": port,
             "step": self.internal_step,
             "q": _joints("start", start, model.n_joints),
             "qd": _joints("start_speed", start_speed, model.n_joints),
-            "handle": None if handle is None else list(checks.pair("handle", handle, unit="m")),
-            "rest": checks.flag("rest", rest),
+            "handle": None if handle is None else list(validation.pair("handle", handle, unit="m")),
+            "rest": validation.flag("rest", rest),
         }
         self.port = port
         self._compile()
@@ -189,7 +189,7 @@ class Slave(Partner):
 def _joints(place: str, values: Any, n: int) -> list[float]:
     if values is None:
         return [0.0] * n
-    given: list[float] = checks.numbers(place, values).reshape(-1).tolist()
+    given: list[float] = validation.numbers(place, values).reshape(-1).tolist()
     if len(given) != n:
         raise BadInput(place, Text(f"{len(given)} values"), f"{n}, one a joint")
     return given

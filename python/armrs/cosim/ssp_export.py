@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from .. import checks
+from .. import validation
 from ..errors import BadInput, Text
 from ..fmu.description import BASE_UNITS
-from ..fmu.export import export_fmu
+from ..fmu.isolated_slave import IsolatedSlave
+from ..fmu.slave_interface import Partner, Variable
 from ..io import files
-from .isolated import IsolatedSlave
-from .partner import Partner, Variable
+from .fmu_export import export_fmu
 from .slave import Slave
 from .ssp import ANNOTATION, NAMESPACES, ROOT
 from .system import Connection, System
@@ -54,9 +54,9 @@ def export_ssp(
     BadInput
         For partners that are no arm and no FMU, and connected arrays: SSP 1.0 has none.
     """
-    target = checks.path("path", path)
+    target = validation.path("path", path)
     files.may_replace(target, ".ssp")
-    if not checks.flag("replace", replace):
+    if not validation.flag("replace", replace):
         files.may_replace_archive(target, ".ssp", ROOT, ANNOTATION)
     with tempfile.TemporaryDirectory(prefix="armrs-ssp-") as place:
         content = {}

@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator
 from ctypes import byref, c_bool, c_double, c_int, c_size_t
 from dataclasses import dataclass, field
 
-from ..cosim.imported import ImportedSlave
-from ..cosim.library import UPDATE_CLOCKS_3
 from ..errors import SlaveError
-from . import values
+from . import variable_access
 from .description import Description, finite
-from .trial import Trial
+from .imported_slave import ImportedSlave
+from .probe_context import Trial
+from .shared_library import UPDATE_CLOCKS_3
 
 Broken = tuple[str, str]
 Call = Callable[..., None]
@@ -188,10 +188,10 @@ def scheduled_execution(trial: Trial) -> None:
     except SlaveError as error:
         trial.find("library, instantiate", f"scheduled execution is refused: {error}")
         return
-    values.set_all(trial, slave, values.settable_at_start(trial), "before the initialization")
+    variable_access.set_all(trial, slave, variable_access.settable_at_start(trial), "before the initialization")
     trial.step("initializing for scheduled execution")
     slave.enter_initialization_mode(trial.start)
-    values.starts(trial, slave)
+    variable_access.starts(trial, slave)
     known = intervals(trial, slave.call, "in the initialization")
     slave.exit_initialization_mode()
     scheduler.slave = slave
@@ -201,7 +201,7 @@ def scheduled_execution(trial: Trial) -> None:
     for clock in clocks(trial.description):
         if (wait := scheduler.countdown.get(clock.name)) is not None:
             _activate(trial, scheduler, trial.start + 2.0 * trial.size + wait, clock)
-    values.reads(trial, slave)
+    variable_access.reads(trial, slave)
     slave.terminate()
     slave.free()
 

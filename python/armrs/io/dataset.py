@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
+from .. import validation
 from ..anthropometry import literature_model
 from ..errors import NO_FILE, ArmrsError, BadInput, BadInputs, Text, nearest
 from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, TrialEntry, load_model
+from ..result_warnings import with_warnings
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
-from ..telling import telling
 from . import files
-from .faults import faults_of
+from .dataset_errors import faults_of
 from .muscle_activity import joint_activity, mark_activity
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
@@ -84,26 +84,26 @@ class Dataset(Framed, Series):
     muscles: tuple[Muscle, ...] = ()
 
     def __post_init__(self) -> None:
-        checks.instance("model", self.model, Model)
-        trials = checks.instances("trials", self.trials, Trial)
+        validation.instance("model", self.model, Model)
+        trials = validation.instances("trials", self.trials, Trial)
         for trial in trials:
             if trial.q.shape[1] != self.model.n_joints:
                 raise BadInput("angles", Text(f"{trial.q.shape[1]} joints"), f"{self.model.n_joints}, as the model has", file=trial.file)
         if self.force_on is not None:
-            checks.choice("force_on", self.force_on, ("robot", "arm"))
+            validation.choice("force_on", self.force_on, ("robot", "arm"))
         if self.sample_rate is not None:
-            checks.number("sample_rate", self.sample_rate, above=0.0, unit="Hz")
-        checks.instance("subject", self.subject, Subject)
-        checks.instance("tolerance", self.tolerance, Tolerance)
+            validation.number("sample_rate", self.sample_rate, above=0.0, unit="Hz")
+        validation.instance("subject", self.subject, Subject)
+        validation.instance("tolerance", self.tolerance, Tolerance)
         for name in ("folder", "model_path"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, checks.path(name, getattr(self, name)))
-        object.__setattr__(self, "name", checks.text("name", self.name))
+                object.__setattr__(self, name, validation.path(name, getattr(self, name)))
+        object.__setattr__(self, "name", validation.text("name", self.name))
         object.__setattr__(self, "trials", trials)
-        object.__setattr__(self, "warnings", checks.instances("warnings", self.warnings, str))
-        object.__setattr__(self, "synthetic", checks.flag("synthetic", self.synthetic))
-        object.__setattr__(self, "added", checks.instances("added", self.added, AddedMass))
-        object.__setattr__(self, "muscles", checks.instances("muscles", self.muscles, Muscle))
+        object.__setattr__(self, "warnings", validation.instances("warnings", self.warnings, str))
+        object.__setattr__(self, "synthetic", validation.flag("synthetic", self.synthetic))
+        object.__setattr__(self, "added", validation.instances("added", self.added, AddedMass))
+        object.__setattr__(self, "muscles", validation.instances("muscles", self.muscles, Muscle))
 
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
@@ -196,7 +196,7 @@ def refuse_other_arms(dataset: Dataset) -> None:
         raise BadInput("[[added]]", Text(f"masses worn in some configurations ({worn})"), allowed, file=file)
 
 
-@telling
+@with_warnings
 def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     """Read a data set: check it, bring it to SI units, to forces on the arm, and to uniform time.
 
@@ -323,7 +323,7 @@ def name_of(path: Path, description: Description) -> str:
 def _on(model: Model, item: AddedMass, place: str, file: Path) -> None:
     """Refuse a mass that is on no segment of a model."""
     try:
-        checks.whole("segment", item.segment, least=1, most=model.n_joints)
+        validation.whole("segment", item.segment, least=1, most=model.n_joints)
         model.with_mass(item.segment, item.mass, item.at)
     except BadInput as error:
         raise error.within(place=place, file=file) from None
@@ -343,7 +343,7 @@ def naming_trials(trials: Sequence[Trial]) -> Iterator[None]:
 
 def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     """Return the path of a `dataset.toml` and its contents."""
-    path = checks.path("source", source)
+    path = validation.path("source", source)
     if not os.path.lexists(path):
         raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)
     trial = path.suffix.lower() in SUFFIXES and path.is_file()
@@ -392,10 +392,10 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     >>> armrs.write_dataset(armrs.load_dataset("session"), "copy", suffix=".parquet").name
     'dataset.toml'
     """
-    checks.instance("dataset", dataset, Dataset)
+    validation.instance("dataset", dataset, Dataset)
     out = files.output_folder(folder)
     if suffix is not None:
-        checks.choice("suffix", suffix, SUFFIXES)
+        validation.choice("suffix", suffix, SUFFIXES)
     if dataset.force_on is None and any(trial.force_on_arm is not None for trial in dataset.trials):
         dataset = dataset.replace(force_on="arm")
     names = output_names([trial.file for trial in dataset.trials], suffix)

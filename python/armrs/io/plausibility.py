@@ -11,10 +11,10 @@ import numpy as np
 
 from ..errors import BadInput, Text
 from ..model import Model, Robot
-from . import readings
-from .chain import chain_points
+from . import column_conventions
+from .column_conventions import Reading
 from .dataset import Dataset
-from .readings import Reading
+from .joint_positions import chain_points
 from .trial import Trial, constant
 
 _FAR = 0.3
@@ -133,10 +133,10 @@ def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarra
     handle = handle_path(robot, robot_q) - base
     found: list[tuple[float, Reading | None]] = [
         (_rms(hand_path(model, reading.angles(q)) - handle), reading)
-        for reading in (*readings.of_angles(q.shape[1]), *readings.of_unit_of_one(q))
+        for reading in (*column_conventions.of_angles(q.shape[1]), *column_conventions.of_unit_of_one(q))
     ]
     tip = hand_path(model, q) + base
-    found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
+    found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in column_conventions.of_robot_angles()]
     return min(found, key=lambda item: item[0])
 
 
@@ -146,7 +146,7 @@ def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float,
     found = [(_best_zero(q[thin], j, lambda tried: _rms(hand_path(model, tried) - handle[thin])), j + 1) for j in range(q.shape[1])]
     nearest = min(found)[0][0]
     (best, off), joint = min((f for f in found if f[0][0] <= nearest + _PLAINER), key=lambda f: abs(f[0][1]))
-    return best, readings.other_zero(q.shape[1], joint, off) if abs(off) >= OTHER_ZERO else None
+    return best, column_conventions.other_zero(q.shape[1], joint, off) if abs(off) >= OTHER_ZERO else None
 
 
 def hand_meets_handle(dataset: Dataset) -> bool:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.quantities import value_in
+from ..analysis.quantity_expressions import value_in
 from ..errors import ArmrsError, one_line
 from ..io.dataset import Dataset
 from ..model import Model
 from ..workflows.identify import Estimate, Identified, identify
 from ..workflows.record import measure
-from .spec import Question, Sweep
+from .sweep_file import Question, Sweep
 
 Row = dict[str, Any]
 _LONGEST_REASON = 300

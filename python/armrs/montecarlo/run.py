@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import checks
+from .. import validation
 from ..io import files
 from ..io.samples import parquet_table
 from ..tabular import Tabular, Tidy
 from ..workflows.record import check_required
-from . import results, workers
-from .spec import Sweep, load_sweep
+from . import result_files, workers
 from .store import Store
 from .summary import summarise
+from .sweep_file import Sweep, load_sweep
 
 MOST_JOBS = 1024
 
@@ -103,8 +103,8 @@ def sweep(
     ArmrsError
         When workers were lost; what is done stays, and the same call goes on.
     """
-    jobs = checks.whole("jobs", jobs, least=1, most=MOST_JOBS)
-    spec = checks.loaded("sweep", source, Sweep, load_sweep)
+    jobs = validation.whole("jobs", jobs, least=1, most=MOST_JOBS)
+    spec = validation.loaded("sweep", source, Sweep, load_sweep)
     out = files.output_folder(folder)
     files.must_be_writable(out)
     store = Store(spec, out)
@@ -134,9 +134,9 @@ def sweep(
         step(spec.cases)
     store.finish()
     summary = summarise(store)
-    data = results.sweep_data(spec, summary, command)
+    data = result_files.sweep_data(spec, summary, command)
     run = {"computed": count, "seconds": time.perf_counter() - began, "largest_process_MB": _largest_process()}
-    written = results.write_sweep(store, data, summary)
+    written = result_files.write_sweep(store, data, summary)
     return Swept(spec, store.final("cases"), store.final("estimates"), data, tuple(written), run)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 from .. import _armrs
 from ..errors import ArmrsError, BadInput, Text
 from .case import Row, compute
-from .spec import Sweep
+from .sweep_file import Sweep
 
 Part = tuple[int, int]
 Done = Iterator[tuple[Part, tuple[list[Row], list[Row]]]]

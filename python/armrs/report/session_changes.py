@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from .tables import two_digits
+from ..formatting import two_digits
 
 NO_CHANGE = "no clear change"
 CLEAR = ("higher", "lower")

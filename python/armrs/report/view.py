@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
+from .. import validation
 from ..errors import BadInput, Text, unknown_name
-from . import html, live, pages, plotting
+from . import html, interactive, pages, plotting
 from .figures import Drawn, Figures, draw, shown
 
 
@@ -34,20 +34,20 @@ class View:
 
     data: Callable[[Any], dict[str, Any]]
     figures: Callable[[Any, Mapping[str, Any]], Figures]
-    moving: Callable[[Any], live.Live] = lambda result: live.NOTHING
+    moving: Callable[[Any], interactive.Live] = lambda result: interactive.NOTHING
 
     def plot(self, result: object, name: str | None) -> np.ndarray:
         """Draw one figure where pyplot shows it, and return its Axes."""
         figures = self.figures(result, self.data(result))
         if not figures:
             raise BadInput("plot", Text("nothing to draw in this result"), "a result with values")
-        if name is not None and checks.text("name", name) not in figures:
+        if name is not None and validation.text("name", name) not in figures:
             raise unknown_name("name", name, figures, what="figure")
         return shown(figures[next(iter(figures)) if name is None else name])
 
     def report(self, result: object, path: str | os.PathLike[str]) -> Path:
         """Write the report as one HTML page with its figures in it."""
-        target = checks.path("path", path)
+        target = validation.path("path", path)
         if target.suffix.lower() != ".html":
             raise BadInput("path", str(target), "the name of a file that ends with .html")
         data = self.data(result)

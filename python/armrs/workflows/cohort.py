@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
+from .. import validation
 from ..analysis import mixed_model, students_t
 from ..analysis.mixed_model import MixedModel
 from ..errors import ArmrsError, BadInput, Text
 from ..io import files, jsonfile
 from ..io.tomlfile import read_text
-from ..report.plain import passive_data
+from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
-from ..telling import telling
 from .history import holm, session_date, without_date
 from .passive import passive_moments
+from .result_data import passive_data
 
 LEVEL = 0.95
 """Share of sessions that a norm band holds, and probability of the intervals."""
@@ -179,7 +179,7 @@ ALL = "all"
 """The group of those of whom none is stated."""
 
 
-@telling
+@with_warnings
 def cohort(
     source: str | os.PathLike[str],
     *,
@@ -213,7 +213,7 @@ def cohort(
     >>> armrs.cohort("values.csv").quantities[0].norm  # doctest: +SKIP
     (0.31, 0.74)
     """
-    path, tell = checks.path("source", source), checks.progress(progress)
+    path, tell = validation.path("source", source), validation.progress(progress)
     if path.is_dir():
         values, warnings = _of_folder(path, _groups(groups), tell)
     elif groups is not None:
@@ -364,7 +364,7 @@ def _groups(path: str | os.PathLike[str] | None) -> Mapping[str, tuple[str, str]
     """Return group and side by the name of a subject or of a data set."""
     if path is None:
         return {}
-    file = checks.path("groups", path)
+    file = validation.path("groups", path)
     return {row["subject"]: (row.get("group", ""), row.get("side", "")) for _, row in _rows(file, ["subject"], ["group", "side"])}
 
 

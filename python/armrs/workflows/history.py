@@ -14,11 +14,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .. import checks
+from .. import validation
 from ..errors import BadInput, Text, show
+from ..formatting import course_label
 from ..io import files
 from ..io.dataset import Dataset
-from ..report.tables import course_label
 from ..tabular import Tabular, Tidy
 from .identify import Estimate
 
@@ -236,7 +236,7 @@ def without_date(name: str) -> str:
 
 def check(path: str | os.PathLike[str], joints: int, subject: str) -> None:
     """Refuse a history file that cannot be added to, before any work is done."""
-    file = checks.path("history", path)
+    file = validation.path("history", path)
     files.must_be_writable(file)
     if file.is_dir():
         raise BadInput("history", Text("a folder"), "the name of a file", file=file)
@@ -328,7 +328,7 @@ def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> bool
 
 def read(path: str | os.PathLike[str], method: str = "joint") -> History:
     """Return every parameter that the data decided in the last session, over all sessions in which they did."""
-    with _reading(checks.path("history", path)) as connection:
+    with _reading(validation.path("history", path)) as connection:
         return _courses(connection, method)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _armrs, checks
+from .. import _armrs, validation
 from ..catalogue import catalogue
 from ..errors import ArmrsError, BadInput, Sentence, Text
 from ..io import files
@@ -22,7 +22,7 @@ from ..io.samples import write_samples
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
-from .driven import CoreRun, driven
+from .core_experiment import CoreRun, driven
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .force_sensor import CHANNELS, RobotMotion, digitised
 from .interaction import CONTROL_RATE, Interacted
@@ -121,7 +121,7 @@ def record(
     ArmrsError
         When the supervisor stopped every trial to be fitted.
     """
-    experiment = checks.loaded("experiment", experiment, Experiment, load_experiment)
+    experiment = validation.loaded("experiment", experiment, Experiment, load_experiment)
     out = files.output_folder(folder)
     former = _former(out)
     check_required(experiment)

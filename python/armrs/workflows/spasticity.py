@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .. import _armrs, checks
-from ..analysis import stretches
-from ..analysis.directions import LEAST_RANGE
+from .. import _armrs, validation
+from ..analysis import stretch_reflex
+from ..analysis.motion_direction import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
-from ..analysis.stretches import Reflex, Stretch
+from ..analysis.stretch_reflex import Reflex, Stretch
 from ..analysis.uncertainty import Deviations, angle_errors, sensitivity
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
@@ -22,8 +22,8 @@ from ..io.muscle_activity import co_contraction, onset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import Trial
 from ..model import Model
+from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
-from ..telling import telling
 from .identify import Estimate
 from .passive import TrialMoments, trial_moments
 
@@ -118,7 +118,7 @@ class Spasticity(Tabular):
     dataset: Dataset = field(repr=False)
 
     method: ClassVar[str] = "spasticity"
-    level: ClassVar[float] = stretches.LEVEL
+    level: ClassVar[float] = stretch_reflex.LEVEL
 
     def __repr__(self) -> str:
         parts = []
@@ -173,7 +173,7 @@ class Spasticity(Tabular):
         return {"effects": effects, "besides": besides, "stretches": stretched, "cutoff_Hz": self.cutoff, "warnings": list(self.warnings)}
 
 
-@telling
+@with_warnings
 def spasticity(
     dataset: Dataset | str | os.PathLike[str],
     *,
@@ -182,8 +182,8 @@ def spasticity(
 ) -> Spasticity:
     """Find the stretch reflex of every joint that was stretched at several speeds: threshold, gain and latency with intervals.
 
-    See `armrs.analysis.stretches` for the law. The resisting moment is that of `passive_moments`, without its slow low-pass: torque of the
-    contact force, less gravity and inertia by the model.
+    See `armrs.analysis.stretch_reflex` for the law. The resisting moment is that of `passive_moments`, without its slow low-pass: torque of
+    the contact force, less gravity and inertia by the model.
 
     Parameters
     ----------
@@ -208,12 +208,12 @@ def spasticity(
     >>> armrs.spasticity("patient")  # doctest: +SKIP
     Spasticity('patient'; joint 1: gain 0.8 ± 0.02 N m s/rad, threshold 0.6 ± 0.01 rad/s, latency 0.04 ± 0.001 s)
     """
-    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    dataset = validation.loaded("dataset", dataset, Dataset, load_dataset)
     slowest = min(trial.rate for trial in dataset.trials)
-    cutoff = checks.number("cutoff", cutoff, above=0.0, unit="Hz")
+    cutoff = validation.number("cutoff", cutoff, above=0.0, unit="Hz")
     # A slow recording is not refused for a default: the cutoff is lowered.
     cutoff = min(cutoff, 0.4 * slowest)
-    tell = checks.progress(progress)
+    tell = validation.progress(progress)
     refuse_implausible(dataset)
     # Samples with muscle activity count here.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
@@ -224,16 +224,16 @@ def spasticity(
         tell(f"reflexes of the {dataset.model.joints[joint].name}", joint / dataset.model.n_joints)
         own = [(m, s) for m, fine in moments if (s := _stretch(dataset, m, joint, cutoff, fine)) is not None]
         speeds = [float(np.abs(s.qd).max()) for _, s in own]
-        if len(own) < stretches.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):
+        if len(own) < stretch_reflex.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):
             continue
-        fitted = stretches.fit([s for _, s in own])
+        fitted = stretch_reflex.fit([s for _, s in own])
         if fitted is None:
             continue
         seen = [_seen(m, s, fitted, k, dataset) for k, (m, s) in enumerate(own)]
         found.append(JointReflex(joint + 1, fitted, tuple(sorted(seen, key=lambda s: s.speed))))
         warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
     if not found:
-        need = f"{stretches.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
+        need = f"{stretch_reflex.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
         raise BadInput("trials", Text("no joint that is stretched at several speeds"), need)
     return Spasticity(tuple(found), cutoff, tuple(warnings), dataset)
 
@@ -338,6 +338,6 @@ def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
         return [f"{name}: no reflex was found up to {fastest:.2g} rad/s"]
     if threshold.value < 0.02 * fastest:
         said.append(f"{name}: the reflex acts at any speed, which is as well a viscosity in one direction")
-    if latency.interval[1] > 0.95 * stretches.LONGEST:
-        said.append(f"{name}: the latency is not told, up to {stretches.LONGEST:g} s")
+    if latency.interval[1] > 0.95 * stretch_reflex.LONGEST:
+        said.append(f"{name}: the latency is not told, up to {stretch_reflex.LONGEST:g} s")
     return said

@@ -25,7 +25,7 @@ def sticking(model: Model) -> Model:
 
     Examples
     --------
-    >>> from armrs.workflows.demo import true_model
+    >>> from armrs.demo import true_model
     >>> sticking(true_model()) == true_model()
     True
     """

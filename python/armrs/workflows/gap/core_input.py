@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ... import _armrs, checks
+from ... import _armrs, validation
 from ...catalogue import catalogue
 from ...errors import BadInput
 from ...io.dataset import Dataset, refuse_other_arms
 from ...io.trial import Trial, bridged
 from ...model import Model, Tolerance
-from .between_samples import unresolved_movements
+from .unresolved_motion import unresolved_movements
 
 
 def is_led(dataset: Dataset) -> bool:
@@ -67,5 +67,5 @@ def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequenc
         led=led,
         weights=[weights.get(t.configuration, 1.0) for t in dataset.trials],
         own=list(own),
-        threads=checks.threads(threads),
+        threads=validation.threads(threads),
     )

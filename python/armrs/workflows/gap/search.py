@@ -6,18 +6,18 @@ import dataclasses
 import os
 from collections.abc import Callable, Sequence
 
-from ... import _armrs, checks, interruptible
+from ... import _armrs, interruptible, validation
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
 from ...io.muscle_activity import comparable
-from ...telling import telling
-from . import maps, separating, suspicion
+from ...result_warnings import with_warnings
+from . import data_checks, discriminating_movements, residual_maps
 from .core_input import core_settings, core_trials, is_led
-from .found import GapFound
+from .gap_result import GapFound
 
 
-@telling
+@with_warnings
 def find_gap(
     dataset: Dataset | str | os.PathLike[str],
     *,
@@ -64,12 +64,12 @@ def find_gap(
     >>> armrs.find_gap("session").verdict  # doctest: +SKIP
     'explained'
     """
-    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    dataset = validation.loaded("dataset", dataset, Dataset, load_dataset)
     dataset = dataset.replace(trials=comparable(dataset.trials))
-    checks.flag("separate", separate)
+    validation.flag("separate", separate)
     if progress is not None:
-        checks.function("progress", progress)
-    effects = checks.instances("effects", effects, OwnEffect)
+        validation.function("progress", progress)
+    effects = validation.instances("effects", effects, OwnEffect)
     own = [e.kind for e in effects]
     try:
         result = _searched(dataset, own, threads, progress)
@@ -81,7 +81,7 @@ def find_gap(
         result = _searched(still, own, threads, progress)
         warned = result.result.replace(warnings=(_torques_instead(error), *result.warnings))
         result = dataclasses.replace(result, result=warned)
-    return separating.separate(result, threads=threads, progress=progress) if separate else result
+    return discriminating_movements.separate(result, threads=threads, progress=progress) if separate else result
 
 
 def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progress: Callable[[str, float], None] | None) -> GapFound:
@@ -89,16 +89,16 @@ def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progres
     settings = core_settings(dataset, led, threads, own)
     columns = core_trials(dataset)
     built = _armrs.Rig(dataset.model, dataset.model.all_effects)
-    warnings = suspicion.examine(dataset, led)
+    warnings = data_checks.examine(dataset, led)
     with naming_trials(dataset.trials):
-        suspicion.refuse_mislabelled(dataset, led, interruptible.call(_armrs.play, built, columns, settings))
+        data_checks.refuse_mislabelled(dataset, led, interruptible.call(_armrs.play, built, columns, settings))
         result = interruptible.call_with_progress(_armrs.find_gap, built, columns, settings, progress=progress)
 
-    def lacking(version: str) -> list[maps.Discrepancy]:
-        return maps.discrepancies(dataset, led, result.trials, version)
+    def lacking(version: str) -> list[residual_maps.Discrepancy]:
+        return residual_maps.discrepancies(dataset, led, result.trials, version)
 
-    looks_like = maps.shape(lacking("amended")) if result.verdict == "unexplained" else None
-    told = result.replace(places=maps.places(lacking("calibrated")), looks_like=looks_like, warnings=(*warnings, *result.warnings))
+    looks_like = residual_maps.shape(lacking("amended")) if result.verdict == "unexplained" else None
+    told = result.replace(places=residual_maps.places(lacking("calibrated")), looks_like=looks_like, warnings=(*warnings, *result.warnings))
     return GapFound(told, dataset)
 
 

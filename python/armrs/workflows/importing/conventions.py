@@ -1,7 +1,7 @@
 """How raw angles and forces are counted, read off the balance of the arm.
 
 For each convention that laboratories use, the torques of the contact force are regressed on gravity, inertia and passive joint laws
-(`armrs.analysis.balance`); the wrong convention leaves most of them unexplained.
+(`armrs.analysis.torque_balance`); the wrong convention leaves most of them unexplained.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis.balance import BALANCED, Motion, motion_of, unexplained
+from ...analysis.torque_balance import BALANCED, Motion, motion_of, unexplained
 from ...errors import BadInput, Text
-from ...io.readings import Reading
+from ...io.column_conventions import Reading
 from ...model import Model
 from .recipe import REFERENCES, ZEROS, Convention
 
