@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import formatting
 from ..online.estimator import STATUSES
-from ..online.replay import NO_REFUSAL, Replay
+from ..online.log_replay import NO_REFUSAL, Replay
 from ..workflows import result_data
 from . import plotting
 from .figures import Drawn, Figures
