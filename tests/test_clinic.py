@@ -115,14 +115,14 @@ def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic_page
     change = result()["history"][0]
     same = change | {"name": "torque", "kind": "coulomb", "since_last": 0.01, "since_last_std": 0.02, "changed_since_last": False}
     lines = clinic_page.lines_of(result(history=[change, same]), norms)
-    assert session_changes.said(lines) == [
+    assert session_changes.change_lines(lines) == [
         "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",
         session_changes.SURE,
         "No clear change: shoulder (friction).",
         session_changes.EITHER_WAY,
     ]
     assert clinic_page.words_of(lines[2])[5] == "no clear change: +0.010 ± 0.039"
-    assert session_changes.said(clinic_page.lines_of(result(history=[]))) == []
+    assert session_changes.change_lines(clinic_page.lines_of(result(history=[]))) == []
     (tmp_path / "a.json").write_text(json.dumps(result(history=[change, same])), encoding="utf-8")
     page = clinic_page.write_summary([tmp_path / "a.json"], tmp_path / "s.html").read_text(encoding="utf-8")
     heads = [page.index(head) for head in ("What changed since", "What was found", "Over the sessions", "What next")]

@@ -98,7 +98,7 @@ def test_what_is_followed_has_the_names_and_units_of_the_page_it_stands_on() -> 
         ["stretch reflex latency, joint 1", "ms", 3, "39.3 ± 2.0", "+2.0 ± 2.0", "no (p = 0.4)", "+2.0 ± 2.0", "yes (p < 1e-12)"],
     ]
     half_width = {**threshold, "kind": "passive", "name": "half_width in slow_elbow", "unit": "N m"}
-    assert formatting.course_label(half_width) == "passive half width, joint 1 in slow_elbow"
+    assert formatting.parameter_label(half_width) == "passive half width, joint 1 in slow_elbow"
     assert len(tables.history([{**threshold, "dates": ["a"], "change": None, "p_value": None}]).head) == 4
 
 
@@ -320,7 +320,7 @@ def test_what_can_change_together_has_units() -> None:
         "combinations": [],
         "scale_free": False,
     }
-    assert common.cannot_tell(result) == [
+    assert common.not_separable(result) == [
         "m1 does not act on the data.",
         "Changing m2 by 1 kg, m1·l1 by -0.376 kg m and I1 + m1·l1² by -0.1414 kg m² together leaves every measurement unchanged: none is "
         "measured alone.",

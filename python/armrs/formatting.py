@@ -140,7 +140,7 @@ def two_digits(std: float) -> int:
     return max(0, 1 - exponent)
 
 
-def course_label(course: Mapping[str, Any]) -> str:
+def parameter_label(course: Mapping[str, Any]) -> str:
     """Name a parameter that is followed, with the number of its joint; a symbol has it already."""
     name, of, movement = str(course["name"]).partition(" in ")
     if course["joint"] is None or course["kind"] in ("segment", "combination"):

@@ -13,7 +13,7 @@ DRAWN_BY = {
     "Checked": "report.dataset_pages:CHECKED",
     "Cohort": "report.clinic_figures:COHORT",
     "Compared": "report.gap.stage_figures:COMPARED",
-    "Coupled": "cosim.coupled_output:COUPLED",
+    "CoupledRun": "cosim.coupled_output:COUPLED",
     "Demonstration": "demo.run:SHOWN",
     "GapFound": "report.gap.result_files:GAP",
     "History": "report.result_files:HISTORY",

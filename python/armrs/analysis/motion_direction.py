@@ -10,7 +10,7 @@ MOVING = 0.25
 """A joint moves when its speed is above this part of its usual speed in the trial."""
 
 
-def told(q: np.ndarray, qd: np.ndarray, known: np.ndarray, margin: int) -> np.ndarray:
+def directions(q: np.ndarray, qd: np.ndarray, known: np.ndarray, margin: int) -> np.ndarray:
     """Return in which direction each joint moves; one that is held rests at any noise.
 
     `margin` samples beside every reversal count as rest: there the low-pass mixes both directions. So do those of unknown moment.

@@ -108,7 +108,7 @@ class Stretch:
         """Return the samples that are fitted."""
         return values[self.edge : len(values) - self.edge]
 
-    def told(self, values: np.ndarray) -> np.ndarray:
+    def reduced(self, values: np.ndarray) -> np.ndarray:
         """Return the samples that are fitted, (n,) or (n, m), less the unknowns of the trial."""
         inner = self.inner(values)
         return np.asarray(inner - self.unknown @ (self.unknown.T @ inner))
@@ -207,9 +207,9 @@ class _Problem:
         self.stretches = list(stretches)
         self.middle = float(np.mean(np.concatenate([s.q for s in stretches])))
         self.ends = np.cumsum([len(s.q) - 2 * s.edge for s in stretches])[:-1]
-        self.linear = np.concatenate([s.told(_columns(s, self.middle)) for s in stretches])
-        self.moment = np.concatenate([s.told(s.moment) for s in stretches])
-        self.shared = np.concatenate([s.told(s.shared.T) for s in stretches])
+        self.linear = np.concatenate([s.reduced(_columns(s, self.middle)) for s in stretches])
+        self.moment = np.concatenate([s.reduced(s.moment) for s in stretches])
+        self.shared = np.concatenate([s.reduced(s.shared.T) for s in stretches])
         self.basis = np.linalg.qr(self.linear)[0]
         self.rest = self.moment - self.basis @ (self.basis.T @ self.moment)
         self.total = float(self.rest @ self.rest)
@@ -217,7 +217,7 @@ class _Problem:
 
     def column(self, direction: int, shape: np.ndarray) -> np.ndarray:
         """Return what a reflex of gain 1 shows in all trials."""
-        return np.concatenate([s.told(drive(s, direction, shape)) for s in self.stretches])
+        return np.concatenate([s.reduced(drive(s, direction, shape)) for s in self.stretches])
 
     def gain(self, direction: int, shape: np.ndarray) -> tuple[float, float]:
         """Return the best gain, not below zero, and the sum of squares that it leaves."""
@@ -325,11 +325,11 @@ class _Problem:
             coarse = replace(own, fine_q=own.coarser(own.fine_q), fine_qd=own.coarser(own.fine_qd))
             dry = linear[ELASTIC + 1]
             seen, told = (gain * drive(s, direction, shape) + dry * _dry(s) for s in (own, coarse))
-            lost.append(own.told(seen - told))
+            lost.append(own.reduced(seen - told))
             own_law, *moved = (
                 _columns(s, self.middle) @ linear + gain * drive(s, direction, shape) for s in (own, *map(own.moved_by, own.misread))
             )
-            placed.append(own.told(own.placed.T - np.array([law - own_law for law in moved]).T))
+            placed.append(own.reduced(own.placed.T - np.array([law - own_law for law in moved]).T))
         return np.concatenate(lost), np.concatenate(placed)
 
     def result(self, direction: int, shape: np.ndarray, free: int) -> Reflex:

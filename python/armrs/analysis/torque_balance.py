@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _armrs
-from ..io.column_conventions import Reading
+from ..io.column_conventions import AlternativeConvention
 from ..io.resample import complete_pieces, uniform_grid, usual_step
 from ..model import Model
 
@@ -58,7 +58,7 @@ class Motion:
     force: np.ndarray
     moment: np.ndarray
 
-    def read_as(self, reading: Reading) -> Motion:
+    def read_as(self, reading: AlternativeConvention) -> Motion:
         """Return the motion in another reading of its columns."""
         turn = reading.turn.T
         scale = float(np.sqrt(abs(np.linalg.det(reading.force))))

@@ -91,7 +91,7 @@ def simulate(
     from ..workflows.result_data import simulated_data
     from ..workflows.simulate import is_doubtful
     from ..workflows.simulation_accuracy import WRONG, step_error
-    from ..workflows.stiction import sticking_said
+    from ..workflows.stiction import sticking_warnings
     from ..workflows.streamed_simulation import stream
 
     if (movement is None) == (trial is None):
@@ -126,7 +126,7 @@ def simulate(
             from ..report.result_files import write_simulated
 
             written = write_simulated(result, plain, folder, suffix=suffix, trial=measured)
-        warnings = [*sticking_said(arm), *result.warnings, *(() if halved is None else halved.warnings)]
+        warnings = [*sticking_warnings(arm), *result.warnings, *(() if halved is None else halved.warnings)]
     console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *warnings])
     present(lambda: plain, json, lambda: sentences.simulated(plain, written))
     worst = max(plain["energy"]["error_share"], 0.0 if halved is None else halved.share)
@@ -230,7 +230,7 @@ def record(
     from ..workflows.experiment import load_experiment
     from ..workflows.record import record as run_record
     from ..workflows.result_data import origin
-    from ..workflows.stiction import sticking_said
+    from ..workflows.stiction import sticking_warnings
 
     writable(out, json, verb="record")
     planned = load_experiment(experiment)
@@ -238,7 +238,7 @@ def record(
         result = run_record(planned, out, step=step)
     plain = result.to_dict() | {"made_by": origin(command_line(context))}
     report = write_recorded(result, plain, out)[-1]
-    console.warn(sticking_said(planned.truth))
+    console.warn(sticking_warnings(planned.truth))
     apart = "" if any(run.tests for run in planned.runs) else "; tests = 1 in [[movement]] records a test trial, which no fit uses"
     worn = ", ".join(run.configuration for run in planned.runs if run.worn)
     alike = f"remove [[added]] and the trials of {worn} from {quoted(out / 'dataset.toml')}, then " if worn else ""
@@ -277,7 +277,7 @@ def sweep(
     """  # noqa: D301 (click reads this backspace as: leave the lines as they are)
     from ..montecarlo import load_sweep, sentences
     from ..montecarlo import sweep as run_sweep
-    from ..workflows.stiction import sticking_said
+    from ..workflows.stiction import sticking_warnings
 
     writable(out, json, verb="sweep")
     if cluster is not None and jobs is not None:
@@ -287,7 +287,7 @@ def sweep(
     with console.progress("cases", planned.cases) as step:
         result = run_sweep(planned, out, jobs=count, cluster=cluster, step=step, command=command_line(context))
     if planned.dataset is None:
-        console.warn(sticking_said(planned.experiment(planned.seed_of(1), []).truth))
+        console.warn(sticking_warnings(planned.experiment(planned.seed_of(1), []).truth))
     present(
         lambda: result.data | {"run": result.run, "files": list(result.files)},
         json,

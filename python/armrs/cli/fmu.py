@@ -63,7 +63,7 @@ def fmu_export(
     from ..cosim.fmu_export import export_fmu
     from ..cosim.slave import Slave
     from ..fmu.bundled_libraries import collected
-    from ..workflows.stiction import too_steep_said
+    from ..workflows.stiction import too_steep_warnings
 
     writable(None, json)
     target = out if out is not None else Path(model.with_suffix(".fmu").name)
@@ -79,7 +79,7 @@ def fmu_export(
         console.warn([f"left out: {', '.join(without)}, because FMI 2.0 has no folder for them; export with --fmi 3"])
     if slave.left_out:
         console.warn([f"left out, because they act in sensors or contact, outside this port: {', '.join(slave.left_out)}"])
-    console.warn(too_steep_said(slave.model, slave.internal_step))
+    console.warn(too_steep_warnings(slave.model, slave.internal_step))
     data = {
         "verb": "fmu export",
         "file": written,
@@ -162,13 +162,13 @@ def fmu_run(
     from ..cosim.slave import Slave
     from ..errors import CoupledError
     from ..report import sentences
-    from ..workflows.stiction import too_steep_said
+    from ..workflows.stiction import too_steep_warnings
 
     suffix = samples_suffix(to, out)
     folder = writable(out, json, verb="fmu run")
     loaded = _loaded(system, step, duration)
     arms = {name: slave for name, slave in loaded.slaves.items() if isinstance(slave, Slave)}
-    console.warn([f"{name}: {said}" for name, arm in arms.items() for said in too_steep_said(arm.model, arm.internal_step)])
+    console.warn([f"{name}: {said}" for name, arm in arms.items() for said in too_steep_warnings(arm.model, arm.internal_step)])
     try:
         # How often a system halves its step until the errors are within its accuracy is not known before.
         total = None if estimate and loaded.refine else loaded.count * (3 if estimate else 1)

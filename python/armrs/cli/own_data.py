@@ -227,7 +227,7 @@ def import_(
     if ask and not talking:
         raise BadInput("--ask", Text("no terminal"), "a terminal to ask on, or --map")
     if ask:
-        columns = ",".join(filter(None, [_asked(sources, tuple(listed(points)), arm), columns]))
+        columns = ",".join(filter(None, [_ask_columns(sources, tuple(listed(points)), arm), columns]))
     try:
         with console.stages("importing") as tell:
             done = import_recordings(sources, out, model=arm, columns_map=columns, progress=tell, **options)  # type: ignore[arg-type]
@@ -236,7 +236,7 @@ def import_(
             raise
         for problem in error.problems if isinstance(error, BadInputs) else (error,):
             print(f"armrs: {problem}", file=sys.stderr)
-        columns = _asked(sources, tuple(listed(points)), arm)
+        columns = _ask_columns(sources, tuple(listed(points)), arm)
         done = import_recordings(sources, out, model=arm, columns_map=columns, **options)  # type: ignore[arg-type]
 
     picture = write_recording(load_dataset(done.folder), done.folder)
@@ -272,7 +272,7 @@ def _joint(text: str) -> int:
     return int(text)
 
 
-def _asked(sources: list[Path], points: tuple[str, ...], model: Path) -> str:
+def _ask_columns(sources: list[Path], points: tuple[str, ...], model: Path) -> str:
     """Ask which column is what, each with a guess; returns the answers as `--map` has them."""
     from ..model import load_model
     from ..workflows.importing.column_questions import questions

@@ -12,10 +12,10 @@ from ..io.samples import write_samples
 from ..report import figures, plotting, result_files
 from ..report.view import View
 from ..workflows import result_data
-from .coupled_run import RESULTS, Coupled
+from .coupled_run import RESULTS, CoupledRun
 
 
-def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[str, Any]:
+def coupled_data(run: CoupledRun, name: str, command: str | None = None) -> dict[str, Any]:
     """Return what a run came to, as it is written to JSON."""
     system = run.system
     return {
@@ -59,7 +59,7 @@ def coupled_data(run: Coupled, name: str, command: str | None = None) -> dict[st
     }
 
 
-def write_coupled(run: Coupled, data: dict[str, Any], folder: Path, *, suffix: str = ".csv") -> list[Path]:
+def write_coupled(run: CoupledRun, data: dict[str, Any], folder: Path, *, suffix: str = ".csv") -> list[Path]:
     """Write `coupled.json`, figures, `report.html`, and the samples of a run that is a result below a folder.
 
     The files are returned, the report last.
@@ -81,20 +81,20 @@ def write_coupled(run: Coupled, data: dict[str, Any], folder: Path, *, suffix: s
     return files.write_whole(folder, write)
 
 
-def samples(run: Coupled) -> dict[str, np.ndarray]:
+def samples(run: CoupledRun) -> dict[str, np.ndarray]:
     """Return every output at every communication point, with its unit in the name of the column."""
     table = run.tidy()
     return {f"{name}_{table.units[name]}" if name in table.units else name: np.asarray(values) for name, values in table.columns.items()}
 
 
-def _figures(run: Coupled) -> figures.Figures:
+def _figures(run: CoupledRun) -> figures.Figures:
     return {"interface": lambda: _drawn(run)}
 
 
 COUPLED = View(lambda run: coupled_data(run, "a coupled run"), lambda run, _: _figures(run))
 
 
-def _drawn(run: Coupled) -> figures.Drawn:
+def _drawn(run: CoupledRun) -> figures.Drawn:
     """Draw inputs over time, what they were off, and the energy that the coupling has created."""
     places = run.system.connections
     units = [report.unit for report in run.connections]

@@ -43,7 +43,7 @@ class ConnectionReport:
 
 
 @dataclass(frozen=True, eq=False)
-class Coupled(Tabular, Series):
+class CoupledRun(Tabular, Series):
     """A run of a system.
 
     Attributes
@@ -93,7 +93,7 @@ class Coupled(Tabular, Series):
     estimates: tuple[Any, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
-        return f"Coupled({', '.join(self.system.slaves)}: {self.verdict}, {self.t[-1]:g} s, {len(self.t)} points)"
+        return f"CoupledRun({', '.join(self.system.slaves)}: {self.verdict}, {self.t[-1]:g} s, {len(self.t)} points)"
 
     def _units(self) -> dict[str, str]:
         """Return the unit of each output."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import CoupledError
 from ..result_warnings import with_warnings
-from .coupled_run import Coupled
+from .coupled_run import CoupledRun
 from .intermediate_outputs import Jump
 from .master import LITTLE, run_system
 from .slave import Slave
@@ -62,7 +62,7 @@ class Estimate:
 
 
 @with_warnings
-def run_checked(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
+def run_checked(system: System, *, progress: Callable[[int], None] = lambda steps: None) -> CoupledRun:
     """Run a system, and once more with half the step; only a run whose largest error is below the accuracy of the system is good.
 
     The second run has half the steps inside of arms, too; steps that an FMU makes inside are its own affair.
@@ -80,7 +80,7 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
 
     Returns
     -------
-    Coupled
+    CoupledRun
         The run with the verdict "good", "ended" where a slave requested its end, or "stable" where its error cannot be estimated, which
         a warning states.
 
@@ -114,7 +114,7 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
         reason = _jumps(run, again)
         if worst.most <= worst.allowed and not reason:
             most = f"the largest: {worst.text}" if worst.error else "both runs are equal except for rounding"
-            why = f"the estimated errors are within the accuracy; {most}{_looked(run)}"
+            why = f"the estimated errors are within the accuracy; {most}{_events_not_searched(run)}"
             text_of_step = f"the step was halved to {run.system.step:g} s, so that the errors are within the accuracy"
             halved = (*system.warnings, *run.warnings, text_of_step) if halvings else run.warnings
             return dataclasses.replace(run, verdict="good", why=why, warnings=halved)
@@ -129,7 +129,7 @@ def run_checked(system: System, *, progress: Callable[[int], None] = lambda step
     raise AssertionError
 
 
-def estimates(run: Coupled, finer: Coupled) -> tuple[Estimate, ...]:
+def estimates(run: CoupledRun, finer: CoupledRun) -> tuple[Estimate, ...]:
     """Estimate the errors of a run from one with half its step."""
     connected = [".".join(c.source) for c in run.system.connections]
     angles = [name for name in run.columns if parted(name, run.system.slaves)[1].startswith("q[")]
@@ -170,7 +170,7 @@ def _beyond(t: np.ndarray, finer: np.ndarray, values: np.ndarray) -> tuple[float
     return float(beyond[worst]), float(finer[worst])
 
 
-def _large_jumps(run: Coupled, finer: Coupled) -> Iterator[tuple[str, str, list[Jump]]]:
+def _large_jumps(run: CoupledRun, finer: CoupledRun) -> Iterator[tuple[str, str, list[Jump]]]:
     """Give every output with jumps above the accuracy: its name, its unit, and these jumps."""
     for name, found in finer.jumps.items():
         slave, variable = parted(name, run.system.slaves)
@@ -179,7 +179,7 @@ def _large_jumps(run: Coupled, finer: Coupled) -> Iterator[tuple[str, str, list[
         yield name, described.unit or "", [jump for jump in found if jump.size > run.system.accuracy * change]
 
 
-def _computed_late(run: Coupled, finer: Coupled) -> list[str]:
+def _computed_late(run: CoupledRun, finer: CoupledRun) -> list[str]:
     """Return which outputs jump where their slaves begin: the first step is made with values that no step computed."""
     first = (finer.resolution or 0.0) * (1.0 + 1e-9)
     late = [
@@ -191,7 +191,7 @@ def _computed_late(run: Coupled, finer: Coupled) -> list[str]:
     ]
 
 
-def _jumps(run: Coupled, finer: Coupled) -> str:
+def _jumps(run: CoupledRun, finer: CoupledRun) -> str:
     """Return which output has jumps whose effect on the others cannot be estimated by two runs."""
     accuracy, resolution = run.system.accuracy, finer.resolution or 0.0
     for name, unit, large in _large_jumps(run, finer):
@@ -223,7 +223,7 @@ def _cannot_halve(system: System) -> str:
     return ""
 
 
-def _differs_at_the_start(run: Coupled, again: Coupled) -> str:
+def _differs_at_the_start(run: CoupledRun, again: CoupledRun) -> str:
     """Return which slave is not as before after a reset."""
     for name, values in run.columns.items():
         if name in again.columns and values[0] != again.columns[name][0]:
@@ -231,12 +231,12 @@ def _differs_at_the_start(run: Coupled, again: Coupled) -> str:
     return ""
 
 
-def _looked(run: Coupled) -> str:
+def _events_not_searched(run: CoupledRun) -> str:
     """Return which events were not searched for."""
     return f"; an event of a partner shorter than {1e3 * run.resolution:.3g} ms can be missed" if run.resolution else ""
 
 
-def _refused(run: Coupled, why: str) -> CoupledError:
+def _refused(run: CoupledRun, why: str) -> CoupledError:
     result = dataclasses.replace(run, verdict="not accurate", why=why)
     error = CoupledError(f"{result.verdict}: {why}")
     error.run = result

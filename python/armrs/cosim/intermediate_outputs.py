@@ -58,7 +58,7 @@ def outliers(changes: np.ndarray) -> np.ndarray:
     return np.where(sizes > _JUMP * beside, sizes, 0.0)
 
 
-class Between:
+class IntermediateOutputs:
     """What connected outputs do between the communication points of a run, seen in its second run with two steps for each.
 
     Parameters

@@ -28,7 +28,7 @@ _UNITS: dict[str, tuple[int, int, int, int]] = {
 _NAMES = {"": "1", "Nm": "N.m", "m_s": "m/s", "rad_s": "rad/s"}
 
 
-class Ready(Partner):
+class BuiltInSlave(Partner):
     """A partner in Python whose outputs follow from its inputs, its time and a few states.
 
     Parameters
@@ -108,7 +108,7 @@ class Ready(Partner):
         self.time = 0.0
 
 
-class Wave(Ready):
+class Wave(BuiltInSlave):
     """The output `y` as a function of time: constant, a sine, or a step.
 
     `y = offset + amplitude · s(t)`, with s = 0 for a constant, `sin(2 π frequency (t − start))`, or 1 from `start` on for a step.
@@ -154,7 +154,7 @@ class Wave(Ready):
         return {"y": self._offset + self._amplitude * s}
 
 
-class Recorded(Ready):
+class Recorded(BuiltInSlave):
     """Columns of a table over time, on straight lines between its rows; before and after them their ends.
 
     Parameters
@@ -178,7 +178,7 @@ class Recorded(Ready):
         return {n: float(np.interp(self.time, self._t, values)) for n, values in self._columns.items()}
 
 
-class Pid(Ready):
+class Pid(BuiltInSlave):
     """A PID controller: `u = kp e + ki ∫ e dt − kd v`, with `e = target − measured` and the rate `v` of what is measured.
 
     Inputs `target`, `measured` and `rate`; output `u`. The rate is an input, so that no noise is differentiated. The integral is that of
@@ -220,7 +220,7 @@ class Pid(Ready):
         return kp * error + ki * self.states["integral"] - kd * self.inputs["rate"]
 
 
-class Impedance(Ready):
+class Impedance(BuiltInSlave):
     """A spring and damper between a target and the hand (Hogan 1985): `F = stiffness (target.r − r) + damping (target.v − v)`.
 
     Inputs `r[1]`, `r[2]`, `v[1]`, `v[2]` of the hand and `target.r[1]` … `target.v[2]`; outputs `F[1]`, `F[2]`, the force on the hand.

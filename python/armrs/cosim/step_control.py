@@ -14,7 +14,7 @@ _REPEATED = 2.0
 """Error, in units of what is allowed, from which a step is made again."""
 
 
-class Pace:
+class StepControl:
     """The steps of a run, one after the other.
 
     With `shortest_step` of the system, a step is a whole number of shortest steps, up to `step`: its error is to stay below what is

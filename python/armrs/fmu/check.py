@@ -88,7 +88,7 @@ def check_fmu(path: str | os.PathLike[str], *, library: bool = True, seconds: fl
             found += [Finding("error", place, text) for place, text in in_terminals(files, description)]
     if library and description is not None and not any(f.place.startswith("binaries") for f in found):
         for part in library_probe.parts(description):
-            found += _tried(Path(path), seconds, part)
+            found += _probe_findings(Path(path), seconds, part)
     return sorted(dict.fromkeys(found), key=lambda f: f.level != "error")
 
 
@@ -133,7 +133,7 @@ def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Findin
             yield Finding(level, f"binaries/{place}", f"found {there}, expected {identifier}{suffix}, the name that modelIdentifier gives")
 
 
-def _tried(path: Path, seconds: float, part: int | None) -> list[Finding]:
+def _probe_findings(path: Path, seconds: float, part: int | None) -> list[Finding]:
     """Try the library, or a part of what it promises, in a process of its own, so that its crash is a finding and not ours."""
     folder = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
     process = None

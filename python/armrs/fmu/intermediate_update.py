@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import SlaveError
 from .imported_slave import ImportedSlave
-from .probe_context import Trial
+from .probe_context import ProbeContext
 from .shared_library import UPDATE_3
 from .slave_interface import StepResult, Variable
 
@@ -32,7 +32,7 @@ class _Watch:
         Whether the instance was allowed to return early; then it has to, as soon as it can.
     """
 
-    trial: Trial
+    probe: ProbeContext
     readable: list[Variable]
     settable: list[Variable]
     early: bool
@@ -64,7 +64,7 @@ class _Watch:
             asked[0] = True
 
     def _timed(self, time: float, *, finished: bool) -> None:
-        late = _LATE * max(self.end - self.begin, abs(self.end)) + self.trial.lag
+        late = _LATE * max(self.end - self.begin, abs(self.end)) + self.probe.lag
         if not self.begin - late <= time <= self.end + late:
             self._find(f"the callback is called for {time:g} s in the step from {self.begin:g} s to {self.end:g} s")
         elif time < self.finished - late:
@@ -81,95 +81,95 @@ class _Watch:
                 self._find(f"{v.name} cannot be {word} in an intermediate update that allows it: {error}")
 
     def _find(self, text: str) -> None:
-        self.trial.find(f"CoSimulation, {_UPDATE}", text, sort="intermediate")
+        self.probe.find(f"CoSimulation, {_UPDATE}", text, sort="intermediate")
 
 
-def intermediate_update(trial: Trial) -> None:
+def intermediate_update(probe: ProbeContext) -> None:
     """Make steps with a callback for intermediate updates where they are promised; compare them with steps without."""
-    if trial.fmi == 2 or trial.wants_events or not trial.flag(_UPDATE):
+    if probe.fmi == 2 or probe.wants_events or not probe.flag(_UPDATE):
         return
-    trial.step("creating an instance with an intermediate update")
-    expected = None if trial.only_once else _without(trial)
-    watch = _watched(trial, early=False)
+    probe.step("creating an instance with an intermediate update")
+    expected = None if probe.only_once else _without(probe)
+    watch = _watched(probe, early=False)
     if watch is None or watch.slave is None:
         return
-    trial.begin(watch.slave)
-    trial.step("doing a step with an intermediate update")
-    watch.step(trial.start, trial.size)
+    probe.begin(watch.slave)
+    probe.step("doing a step with an intermediate update")
+    watch.step(probe.start, probe.size)
     if not watch.times:
-        trial.find(f"CoSimulation, {_UPDATE}", f"the callback is not called in a step of {trial.size:g} s", level="note")
+        probe.find(f"CoSimulation, {_UPDATE}", f"the callback is not called in a step of {probe.size:g} s", level="note")
     if expected is not None:
-        trial.compare(f"CoSimulation, {_UPDATE}", expected, trial.outputs(watch.slave), "with intermediate updates")
+        probe.compare(f"CoSimulation, {_UPDATE}", expected, probe.outputs(watch.slave), "with intermediate updates")
     watch.slave.terminate()
     watch.slave.free()
 
 
-def _without(trial: Trial) -> dict[str, list[Any]]:
+def _without(probe: ProbeContext) -> dict[str, list[Any]]:
     """Return the outputs after a step without a callback."""
-    slave = trial.make()
-    trial.begin(slave)
-    slave.do_step(trial.start, trial.size)
-    found = trial.outputs(slave)
+    slave = probe.make()
+    probe.begin(slave)
+    slave.do_step(probe.start, probe.size)
+    found = probe.outputs(slave)
     slave.free()
     return found
 
 
-def early_return(trial: Trial) -> None:
+def early_return(probe: ProbeContext) -> None:
     """Make an instance that may return early if it declares so, request that where it can, and continue from there."""
-    if trial.fmi == 2 or trial.wants_events or not (trial.flag(_EARLY) or trial.flag(_ON_REQUEST)):
+    if probe.fmi == 2 or probe.wants_events or not (probe.flag(_EARLY) or probe.flag(_ON_REQUEST)):
         return
-    trial.step("creating an instance that may return early")
-    watch = _watched(trial, early=True)
+    probe.step("creating an instance that may return early")
+    watch = _watched(probe, early=True)
     if watch is None or watch.slave is None:
         return
-    trial.begin(watch.slave)
-    trial.step("doing steps that may return early")
-    time = trial.start
+    probe.begin(watch.slave)
+    probe.step("doing steps that may return early")
+    time = probe.start
     offered = False
     for _ in range(_MOST_STEPS):
-        done = watch.step(time, trial.size)
-        wrong = _wrong(trial, watch, done)
+        done = watch.step(time, probe.size)
+        wrong = _wrong(probe, watch, done)
         offered |= watch.asked is not None
         if wrong is not None:
-            trial.find(*wrong)
+            probe.find(*wrong)
         if wrong is not None or done.terminate or done.status > 1:
             break
-        time = done.last_successful_time if done.early_return else time + trial.size
+        time = done.last_successful_time if done.early_return else time + probe.size
         if done.early_return:
-            watch.step(time, trial.size)
+            watch.step(time, probe.size)
             break
-    if trial.flag(_ON_REQUEST) and trial.flag(_UPDATE) and not offered:
-        trial.find(f"CoSimulation, {_ON_REQUEST}", f"no early return is offered in {_MOST_STEPS} steps of {trial.size:g} s", level="note")
+    if probe.flag(_ON_REQUEST) and probe.flag(_UPDATE) and not offered:
+        probe.find(f"CoSimulation, {_ON_REQUEST}", f"no early return is offered in {_MOST_STEPS} steps of {probe.size:g} s", level="note")
     watch.slave.terminate()
     watch.slave.free()
 
 
-def _wrong(trial: Trial, watch: _Watch, done: StepResult) -> tuple[str, str] | None:
+def _wrong(probe: ProbeContext, watch: _Watch, done: StepResult) -> tuple[str, str] | None:
     """Return place and text of what is wrong with how a step returned."""
     reached, place = done.last_successful_time, "library, DoStep"
-    if done.early_return and not watch.begin < reached <= watch.end + trial.lag:
+    if done.early_return and not watch.begin < reached <= watch.end + probe.lag:
         return place, f"it returns early from the step from {watch.begin:g} s to {watch.end:g} s with lastSuccessfulTime {reached:g} s"
-    if watch.asked is not None and not done.early_return and watch.asked < watch.end - trial.lag - _LATE * abs(watch.end):
+    if watch.asked is not None and not done.early_return and watch.asked < watch.end - probe.lag - _LATE * abs(watch.end):
         return f"CoSimulation, {_ON_REQUEST}", f"it offered early return but did not return early when requested at {watch.asked:g} s"
-    if done.early_return and watch.asked is None and not trial.flag(_EARLY):
+    if done.early_return and watch.asked is None and not probe.flag(_EARLY):
         # It was allowed to: an importer that reads the description alone would not have expected it.
-        trial.find(f"CoSimulation, {_EARLY}", "is not true, but it returns early without a request", level="note")
+        probe.find(f"CoSimulation, {_EARLY}", "is not true, but it returns early without a request", level="note")
     return None
 
 
-def _watched(trial: Trial, *, early: bool) -> _Watch | None:
+def _watched(probe: ProbeContext, *, early: bool) -> _Watch | None:
     """Return an instance with a callback; None where it is refused."""
-    marked = {e.get("name") for e in trial.description.root.iterfind("ModelVariables/*") if e.get("intermediateUpdate") in ("true", "1")}
-    variables = [v for v in trial.readable() if v.name in marked]
+    marked = {e.get("name") for e in probe.description.root.iterfind("ModelVariables/*") if e.get("intermediateUpdate") in ("true", "1")}
+    variables = [v for v in probe.readable() if v.name in marked]
     # The same value again leaves a step as it is.
     settable = [v for v in variables if v.causality == "input" and v.is_signal and v.start is not None]
-    watch = _Watch(trial, [v for v in variables if v.causality != "input"], settable, early)
+    watch = _Watch(probe, [v for v in variables if v.causality != "input"], settable, early)
     required = [v.reference for v in (*watch.readable, *settable)]
-    update = UPDATE_3(watch) if trial.flag(_UPDATE) else None
+    update = UPDATE_3(watch) if probe.flag(_UPDATE) else None
     try:
-        watch.slave = trial.make(intermediate=update, early=early, required=required)
+        watch.slave = probe.make(intermediate=update, early=early, required=required)
     except SlaveError as error:
-        word = _ON_REQUEST if early and trial.flag(_ON_REQUEST) else _EARLY if early else _UPDATE
-        trial.find(f"CoSimulation, {word}", f"an instance with {'early returns' if early else 'a callback'} is refused: {error}")
+        word = _ON_REQUEST if early and probe.flag(_ON_REQUEST) else _EARLY if early else _UPDATE
+        probe.find(f"CoSimulation, {word}", f"an instance with {'early returns' if early else 'a callback'} is refused: {error}")
         return None
     return watch

@@ -21,7 +21,7 @@ _SOLVED = 1e-6
 
 
 @dataclass
-class Trial:
+class ProbeContext:
     """One FMU on trial.
 
     Attributes

@@ -20,7 +20,7 @@ from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, T
 from ..result_warnings import with_warnings
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
 from . import files
-from .dataset_errors import faults_of
+from .dataset_errors import dataset_errors_of
 from .muscle_activity import joint_activity, mark_activity
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
@@ -358,7 +358,7 @@ def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     try:
         return path, Description.load(path)
     except BadInput as first:
-        raise BadInputs.of(faults_of(path).found or [first]) from None
+        raise BadInputs.of(dataset_errors_of(path).found or [first]) from None
 
 
 def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: str | None = None) -> Path:

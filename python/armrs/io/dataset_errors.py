@@ -21,7 +21,7 @@ _TRIAL = re.compile(r"\[\[trial\]\] (\d+)")
 
 
 @dataclass(frozen=True)
-class Faults:
+class DatasetErrors:
     """What is wrong with a `dataset.toml`, and what can be read of it all the same.
 
     Attributes
@@ -42,7 +42,7 @@ class Faults:
     names_model: bool = False
 
 
-def faults_of(path: Path) -> Faults:
+def dataset_errors_of(path: Path) -> DatasetErrors:
     """Return the faults of a `dataset.toml`.
 
     Parameters
@@ -61,11 +61,11 @@ def faults_of(path: Path) -> Faults:
         read = _read(document)
         if isinstance(read, Description):
             named = [trial.get("file") for trial in written["trial"]]
-            return Faults(found, read, [trial for trial in read.trials if trial.file in named], read.model == written.get("model"))
+            return DatasetErrors(found, read, [trial for trial in read.trials if trial.file in named], read.model == written.get("model"))
         found.append(read.within(file=path))
         if not _mend(document, read):
             break
-    return Faults(found)
+    return DatasetErrors(found)
 
 
 def _read(document: dict[str, Any]) -> Description | BadInput:

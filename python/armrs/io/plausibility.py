@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import BadInput, Text
 from ..model import Model, Robot
 from . import column_conventions
-from .column_conventions import Reading
+from .column_conventions import AlternativeConvention
 from .dataset import Dataset
 from .joint_positions import chain_points
 from .trial import Trial, constant
@@ -49,7 +49,7 @@ def refuse_implausible(dataset: Dataset) -> None:
     if dataset.model.robot is not None:
         for trial in dataset.trials:
             if trial.robot_q is not None:
-                _refuse_apart(dataset.model, dataset.model.robot, trial)
+                _refuse_hand_off_handle(dataset.model, dataset.model.robot, trial)
 
 
 def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
@@ -63,7 +63,7 @@ def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
                     yield BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
 
 
-def _refuse_apart(model: Model, robot: Robot, trial: Trial) -> None:
+def _refuse_hand_off_handle(model: Model, robot: Robot, trial: Trial) -> None:
     """Compare where the measured angles put the hand with where the robot's put its handle."""
     assert trial.robot_q is not None
     good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
@@ -128,10 +128,12 @@ def _best_zero(q: np.ndarray, joint: int, apart: Callable[[np.ndarray], float]) 
     return min(sizes), best
 
 
-def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray, base: np.ndarray) -> tuple[float, Reading | None]:
+def _other_reading(
+    model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray, base: np.ndarray
+) -> tuple[float, AlternativeConvention | None]:
     """Return what the angles of arm or robot may be instead, and how far apart hand and handle are then [m]."""
     handle = handle_path(robot, robot_q) - base
-    found: list[tuple[float, Reading | None]] = [
+    found: list[tuple[float, AlternativeConvention | None]] = [
         (_rms(hand_path(model, reading.angles(q)) - handle), reading)
         for reading in (*column_conventions.of_angles(q.shape[1]), *column_conventions.of_unit_of_one(q))
     ]
@@ -140,7 +142,7 @@ def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarra
     return min(found, key=lambda item: item[0])
 
 
-def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, Reading | None]:
+def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, AlternativeConvention | None]:
     """Return another zero of one joint's angle, and how far apart hand and handle are with it [m]; None where it is a small error."""
     thin = slice(None, None, max(1, len(q) // 100))
     found = [(_best_zero(q[thin], j, lambda tried: _rms(hand_path(model, tried) - handle[thin])), j + 1) for j in range(q.shape[1])]

@@ -49,7 +49,7 @@ def _case(sweep: Sweep, number: int) -> tuple[Row, list[Row]]:
             measured = measure(experiment)
             dataset, truth = measured.dataset, experiment.truth
             row["stopped"] = sum(story["stop"] is not None for story in measured.trials)
-        row |= _seen(dataset)
+        row |= _trial_statistics(dataset)
         if sweep.question is None:
             return row, []
         result = _identify(dataset, sweep.question)
@@ -84,7 +84,7 @@ def _identify(dataset: Dataset, question: Question) -> Identified:
     )
 
 
-def _seen(dataset: Dataset) -> Row:
+def _trial_statistics(dataset: Dataset) -> Row:
     """Return the values of every case on its trials; forces [N]."""
     sizes = [np.hypot(*t.force_on_arm[np.isfinite(t.force_on_arm).all(axis=1)].T) for t in dataset.trials if t.force_on_arm is not None]
     row: Row = {"trials": len(dataset.trials)}

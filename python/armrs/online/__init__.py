@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from .estimator import Compensation, Estimator, Health, OnlineEstimate
 from .log import Log, load_log
-from .monitor import Channel, Monitor, Stop, watch
 from .log_replay import Replay, replay
+from .monitor import Channel, Monitor, Stop, watch
 from .settings import Settings, default_settings
 
 __all__ = [

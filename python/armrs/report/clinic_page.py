@@ -203,9 +203,9 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             "lines": lines,
             "words": [words_of(line) for line in lines],
             "estimates": estimates(lines, results),
-            "changes": session_changes.said(lines),
+            "changes": session_changes.change_lines(lines),
             "unusual": unusual(lines, results),
-            "notes": [*_apart(found), *notes(results)],
+            "notes": [*_contradictions(found), *notes(results)],
             "since": max((c["dates"][-2] for r in results for c in r.get("history", ()) if len(c["dates"]) > 1), default=None),
             "not_measured": not_measured(results, lines),
             "next": next_steps(results, lines),
@@ -288,7 +288,7 @@ _WHY = {
 """Why an analysis states another number than the one before it."""
 
 
-def _apart(lines: Sequence[Line]) -> list[str]:
+def _contradictions(lines: Sequence[Line]) -> list[str]:
     """Return the quantities for which two results contradict each other."""
     said = []
     for line in _once(lines):

@@ -144,7 +144,7 @@ def _history(courses: Sequence[Mapping[str, Any]], panel: tuple[float, float]) -
         ax.errorbar(place, values, 2.0 * bars, fmt="o-", color=colour, capsize=3)
         ax.margins(y=0.15)
         ax.set_xticks(place, course["dates"], rotation=30, ha="right", fontsize="small")
-        ax.set(title=f"{formatting.typeset(formatting.course_label(course))}{', changed' if course['changed'] else ''}", ylabel=held_in)
+        ax.set(title=f"{formatting.typeset(formatting.parameter_label(course))}{', changed' if course['changed'] else ''}", ylabel=held_in)
         ax.title.set_fontsize("small")
     for ax in axes[len(courses) :]:
         ax.remove()

@@ -155,7 +155,7 @@ def _planned(result: Mapping[str, Any]) -> str:
 
 def _followed(result: Mapping[str, Any]) -> str:
     courses = result["courses"]
-    changed = [formatting.course_label(c) for c in courses if c["changed"]]
+    changed = [formatting.parameter_label(c) for c in courses if c["changed"]]
     said = f"{', '.join(changed)} changed in the last session" if changed else "No parameter changed in the last session"
     return f"{len(courses)} parameters are followed. {said}, at a level of 5 % over all of them together."
 
@@ -192,7 +192,7 @@ def check_lines(result: Mapping[str, Any]) -> list[str]:
     return [str(check["text"]) for check in result.get("checks", ())]
 
 
-def cannot_tell(result: Mapping[str, Any]) -> list[str]:
+def not_separable(result: Mapping[str, Any]) -> list[str]:
     """Return what the data cannot determine, a line each."""
     units = {formatting.symbol(item["name"]): formatting.unit(item["unit"]) for item in (*result["parameters"], *result["combinations"])}
     lines = [_trade(line, units) for line in result["not_separable"]]
@@ -229,7 +229,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         tables.estimates(result["calibration"], joints, level),
     )
     show(f"Torque residual below {result['cutoff_Hz']:.3g} Hz, root mean square", tables.residuals(result["residual_rms"], joints))
-    lines = cannot_tell(result)
+    lines = not_separable(result)
     if lines:
         print(f"What cannot be distinguished: {independent(result)}.")
         print("\n".join(f"  {line}" for line in lines))

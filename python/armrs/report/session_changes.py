@@ -54,7 +54,7 @@ def trend(change: float, either_way: float, before: float | None, *, clear: bool
     return f"{'higher' if change > 0.0 else 'lower'} by {abs(change):.{decimals}f} ± {width}{share}"
 
 
-def said(rows: Sequence[Row]) -> list[str]:
+def change_lines(rows: Sequence[Row]) -> list[str]:
     """Return what changed since the session before, what did not, and how sure that is; nothing without a session before."""
     followed = [row for row in rows if row.trend is not None]
     clear = [row for row in followed if row.trend and row.trend.startswith(CLEAR)]

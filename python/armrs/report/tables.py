@@ -7,7 +7,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..formatting import _EVEN, course_label, digits, number, percent, plus_minus, probability, read_followed, read_in, spread, symbol, unit
+from ..formatting import (
+    _EVEN,
+    digits,
+    number,
+    parameter_label,
+    percent,
+    plus_minus,
+    probability,
+    read_followed,
+    read_in,
+    spread,
+    symbol,
+    unit,
+)
 
 DECIDED_BY = {
     "data": "the measurement",
@@ -309,7 +322,7 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
             tested = f"{'yes' if c[changed] else 'no'} (p {_chance(c[p])})" if several else "–"
             cells += [plus_minus(factor * c[name], factor * c[f"{name}_std"], "+") if several else "–", tested]
         last = plus_minus(factor * c["values"][-1], factor * c["stds"][-1])
-        rows.append([course_label(c), held_in, len(c["dates"]), last, *cells])
+        rows.append([parameter_label(c), held_in, len(c["dates"]), last, *cells])
     head = ["parameter", "unit", "sessions", "last ± std", "since the session before", "changed", "since all before", "changed"]
     # The session before is all before the second one.
     shown = {0: 4, 1: 4, 2: 6}.get(max((len(c["dates"]) for c in courses), default=0), len(head))

@@ -73,7 +73,7 @@ def sums(segments: tuple[Segment, ...]) -> dict[str, float]:
     return dict(zip(SUMS, (first, two.mass * two.com + two.length * three.mass, three.mass * three.com), strict=True))
 
 
-def believed(table: str) -> tuple[Segment, ...]:
+def literature_segments(table: str) -> tuple[Segment, ...]:
     """Return the segments of a subject by the literature."""
     return simulated_arms.literature(Subject(MASSES[table], HEIGHTS[table], "male"))
 
@@ -85,7 +85,7 @@ def truth(table: str) -> Model:
     size = 1.0 + SPREAD * np.random.default_rng([SEED, 46, number]).standard_normal((3, 2))
     segments = tuple(
         Segment(s.name, s.length, s.mass * m, min(s.com * c, s.length), s.inertia * m)
-        for s, (m, c) in zip(believed(table), size, strict=True)
+        for s, (m, c) in zip(literature_segments(table), size, strict=True)
     )
     return passive_arm(segments, number)
 
@@ -99,7 +99,7 @@ def measure(table: str, configuration: int, count: int = 2) -> Measured:
     seed = SEED + 100 * SUBJECTS[table] + 10 * configuration
     run = simulated_arms.run(truth(table), path, range(seed, seed + count))
     trials = simulated_arms.trials(run, f"configuration {configuration}")
-    model = simulated_arms.arm(believed(table)).replace(segment_uncertainty=LITERATURE)
+    model = simulated_arms.arm(literature_segments(table)).replace(segment_uncertainty=LITERATURE)
     data = Dataset(f"virtual subject {SUBJECTS[table]}", model, tuple(trials), "robot", synthetic=True)
     open_ = data.replace(model=model.replace(segment_uncertainty=WIDE))
     return Measured(run, data, tuple(identify(open_.replace(trials=(t,)), method="cascade") for t in trials))
@@ -122,7 +122,7 @@ def literature() -> Found:
     """Compute the references of the three subjects."""
     rows = []
     for table in MASSES:
-        one, two, three = believed(table)
+        one, two, three = literature_segments(table)
         printed = {row[0]: row[1] for row in HUMAN[table][1]}
         ours = {"m3·l3": three.mass * three.com, "m3": three.mass, "m2·l2": two.mass * two.com, "m2": two.mass, "m1·l1": one.mass * one.com}
         rows += [
@@ -318,7 +318,7 @@ def virtual_subjects() -> Found:
     errors: dict[str, list[float]] = {"cascade": [], "joint": []}
     held, prior = list[bool](), 0
     for table in MASSES:
-        right, guess = sums(truth(table).segments), sums(believed(table))
+        right, guess = sums(truth(table).segments), sums(literature_segments(table))
         for configuration in range(1, 5):
             cascade = measure(table, configuration).published()
             joint = {e.name.replace("*", "·"): e for e in at_once(table, configuration).combinations}

@@ -301,10 +301,10 @@ def expected(exact: bool) -> dict[str, float]:
 
     `exact` sensors have noise alone; otherwise their calibration has the default tolerances: 0.3°, 0.2 N, 1 %, 5 ms, 1 mm.
     """
-    believed = simulated_arms.mechanical(True).replace(segment_uncertainty=demo.MASS_FACTOR - 1.0)
+    given = simulated_arms.mechanical(True).replace(segment_uncertainty=demo.MASS_FACTOR - 1.0)
     path = Movement(MECHANICAL_PATH.waypoints, speed=SPEED, acceleration=0.2)
     promised = Tolerance(0.0, 0.0, 0.0, 0.0, 0.0) if exact else Tolerance()
-    plan = forecast(believed, [path], repeats=MEASUREMENTS, with_effects=(), instruments=Instruments(tolerance=promised))
+    plan = forecast(given, [path], repeats=MEASUREMENTS, with_effects=(), instruments=Instruments(tolerance=promised))
     named = {p.name.replace("*", "·") if p.joint is None else f"τp{p.joint}": 100.0 * p.std / p.value for p in plan.predictions}
     return {name: named[name] for name in LIMITS}
 

@@ -69,13 +69,13 @@ def as_simulated(model: Model, elasticity: float = ELASTICITY) -> Model:
     return model.replace(joints=tuple(Joint(j.name, stiffness=elasticity, viscosity=VISCOSITY) for j in model.joints), effects=())
 
 
-def measured(truth: Model, movement: Movement, believed: Model) -> Dataset:
+def measured(truth: Model, movement: Movement, given: Model) -> Dataset:
     """Record one trial in the virtual laboratory: robot controller at 4 kHz, force sensor of 12 bit, markers at 50 Hz."""
     experiment = Experiment(
         name="simulation against measurement",
         seed=1,
         truth=truth,
-        believed=believed,
+        believed=given,
         subject=Subject(),
         runs=(Run("movement", movement, 1, 0, ()),),
         controller=Controller(),
@@ -113,10 +113,10 @@ def of_human_arm() -> Comparison:
     )
     effects = (Effect("biarticular", 2, parameters={"stiffness": 0.6, "ratio": 1.0, "rest": 0.4}),)
     truth = model.replace(segments=segments, joints=joints, effects=effects)
-    believed = as_simulated(model)
-    wrist = believed.joints[2]
-    believed = believed.replace(joints=(*believed.joints[:2], Joint(wrist.name, stiffness=6.0, viscosity=VISCOSITY)))
-    return Comparison(simulate(believed, HUMAN_PATH, rate=RATE), measured(truth, HUMAN_PATH, model))
+    given = as_simulated(model)
+    wrist = given.joints[2]
+    given = given.replace(joints=(*given.joints[:2], Joint(wrist.name, stiffness=6.0, viscosity=VISCOSITY)))
+    return Comparison(simulate(given, HUMAN_PATH, rate=RATE), measured(truth, HUMAN_PATH, model))
 
 
 def _film(comparison: Comparison, title: str) -> dict[str, object]:

@@ -19,7 +19,7 @@ from ..errors import ArmrsError, BadInput, BadInputs
 from ..formatting import how_many
 from ..io import plausibility
 from ..io.dataset import FILE, NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
-from ..io.dataset_errors import faults_of
+from ..io.dataset_errors import dataset_errors_of
 from ..io.samples import NUMBER, header_of
 from ..io.trial import Reading, Trial, moving_bases, still_angles
 from ..model import Description, Model, TrialEntry
@@ -168,7 +168,7 @@ def _despite_faults(source: Path, problems: list[Problem]) -> None:
     """Add the problems of model and trial files where faults of `dataset.toml` leave them to be read."""
     path = source / FILE if source.is_dir() else source
     try:
-        faults = faults_of(path)
+        faults = dataset_errors_of(path)
     except BadInput:  # it is among the problems
         return
     if faults.rest is not None:

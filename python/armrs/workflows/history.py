@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import validation
 from ..errors import BadInput, Text, show
-from ..formatting import course_label
+from ..formatting import parameter_label
 from ..io import files
 from ..io.dataset import Dataset
 from ..tabular import Tabular, Tidy
@@ -136,7 +136,7 @@ class Course:
     @property
     def label(self) -> str:
         """Name for people."""
-        return course_label({"name": self.name, "kind": self.kind, "joint": self.joint})
+        return parameter_label({"name": self.name, "kind": self.kind, "joint": self.joint})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""

@@ -41,7 +41,7 @@ DEFAULT_BINS = 24
 """Angle bins over the range of a joint in one configuration."""
 MARGIN = 0.43
 """The low-pass mixes what lies within this time, in periods of its cutoff."""
-APART = np.radians(10.0)
+CENTRES_APART = np.radians(10.0)
 """Repeats whose mean angles differ by more are no repeats of one movement [rad]."""
 CARRIED = (0.05, 20.0)
 """The force carries an arm that is led: its torque along that of the weight, relative to that. Outside of this, unit or side are wrong."""
@@ -420,7 +420,7 @@ def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments
             inertial[piece] += _carried(unit, angle, _armrs.smooth(np.ascontiguousarray(trial.base[piece]), trial.rate, cutoff)[2])
         moment[piece] = torque - inertial[piece]
     moment[~trial.valid] = np.nan
-    direction = motion_direction.told(q, qd, np.isfinite(moment), round(MARGIN * trial.rate / cutoff))
+    direction = motion_direction.directions(q, qd, np.isfinite(moment), round(MARGIN * trial.rate / cutoff))
     return TrialMoments(trial, q, qd, moment, inertial, direction, seen, sign)
 
 
@@ -513,7 +513,7 @@ def _shifts(
 
 def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependence, ...]:
     """Fit every joint that moved in several configurations against the joint next to it, the one before where there are two."""
-    found: dict[tuple[int, int], list[double_exponential.Course]] = {}
+    found: dict[tuple[int, int], list[double_exponential.MomentCurve]] = {}
     for joint in sorted({c.joint for c in curves}):
         own = [c for c in curves if c.joint == joint and _led_by(c)]
         n = own[0].held.shape[1] if own else 1
@@ -527,7 +527,7 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependen
                 if there.sum() >= 4:
                     known = np.nan_to_num(curve.elastic_errors[:, there].T)
                     course = (curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration, known)
-                    courses.append(double_exponential.Course(*course))
+                    courses.append(double_exponential.MomentCurve(*course))
         found[joint, adjacent] = courses
     return joint_coupling.fit_joints(found, LEVEL)
 
@@ -589,7 +589,7 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
             )
     places = np.array([repeat_statistics.mean(m.q) for m in repeats])
     for j, at in enumerate(places[np.isfinite(places).all(axis=1)].T, start=1):
-        if at.size and np.ptp(at) > APART:
+        if at.size and np.ptp(at) > CENTRES_APART:
             where = f"{repeats[0].trial.configuration}: its repeats have joint {j} up to {np.degrees(np.ptp(at)):.3g}° apart"
             lines.append(f"{where}: another unit, swapped columns, or two configurations?")
     return lines

@@ -12,7 +12,7 @@ from ..analysis.torque_balance import BALANCED, SAMPLES, Motion, motion_of, unex
 from ..errors import BadInput, Text
 from ..formatting import plus_minus
 from ..io import column_conventions
-from ..io.column_conventions import Reading
+from ..io.column_conventions import AlternativeConvention
 from ..io.dataset import Dataset
 from ..io.files import first_of
 from ..io.plausibility import OTHER_ZERO, hand_meets_handle
@@ -207,7 +207,7 @@ def _unproved(model: Model, motion: Motion, *, met: bool) -> list[str]:
     return [f"the forces do not decide what the columns hold{why}: {said}"]
 
 
-def _ranked(model: Model, motion: Motion, met: bool) -> list[tuple[float, Reading]]:
+def _ranked(model: Model, motion: Motion, met: bool) -> list[tuple[float, AlternativeConvention]]:
     """Return what every other reading leaves, the least first; of the forces alone where the angles are known to be right."""
     n = model.n_joints
     asked = [*column_conventions.of_forces(n)] if met else [*column_conventions.of_angles(n), *column_conventions.of_forces(n)]
@@ -221,7 +221,7 @@ def _motion(trials: Sequence[Trial], samples: int = SAMPLES) -> Motion | None:
     return motion_of(recordings, samples)
 
 
-def _other_zero(model: Model, motion: Motion) -> tuple[float, Reading] | None:
+def _other_zero(model: Model, motion: Motion) -> tuple[float, AlternativeConvention] | None:
     """Return the zero of one angle with which the arm balances best, and what is left then.
 
     None where it is a small error, or a quarter turn of the first angle, which is a convention.

@@ -44,7 +44,7 @@ CATCH_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class StretchSeen:
+class MeasuredStretch:
     """One stretch: the motion of a trial in the direction that is resisted.
 
     Attributes
@@ -90,13 +90,13 @@ class JointReflex:
     joint : int
         From 1.
     reflex : Reflex
-    stretches : tuple of StretchSeen
+    stretches : tuple of MeasuredStretch
         By speed.
     """
 
     joint: int
     reflex: Reflex
-    stretches: tuple[StretchSeen, ...]
+    stretches: tuple[MeasuredStretch, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ class Spasticity(Tabular):
     def tidy(self) -> Tidy:
         """Return the stretches, one a row."""
         rows = [(j.joint, s) for j in self.joints for s in j.stretches]
-        names = list(StretchSeen.__dataclass_fields__)
+        names = list(MeasuredStretch.__dataclass_fields__)
         columns: dict[str, list[Any]] = {"joint": [joint for joint, _ in rows]}
         units = dict.fromkeys(("peak_moment", "elastic", "resisting", "reflex"), "N m")
         units |= {"speed": "rad/s", "work": "J", "catch_angle": "rad", "catch_speed": "rad/s", "emg_onset": "s", "emg_latency": "s"}
@@ -229,7 +229,7 @@ def spasticity(
         fitted = stretch_reflex.fit([s for _, s in own])
         if fitted is None:
             continue
-        seen = [_seen(m, s, fitted, k, dataset) for k, (m, s) in enumerate(own)]
+        seen = [_measured_stretch(m, s, fitted, k, dataset) for k, (m, s) in enumerate(own)]
         found.append(JointReflex(joint + 1, fitted, tuple(sorted(seen, key=lambda s: s.speed))))
         warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
     if not found:
@@ -290,7 +290,7 @@ def low_pass(rate: float, cutoff: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda values: _armrs.smooth(np.ascontiguousarray(values[:, None]), rate, cutoff)[0][:, 0]
 
 
-def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, session: Dataset) -> StretchSeen:
+def _measured_stretch(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, session: Dataset) -> MeasuredStretch:
     """Return what one stretch of a session shows: from where the joint begins to move in the direction that is resisted, to its turn."""
     along = fitted.direction * stretch.qd
     peak = int(np.argmax(along))
@@ -313,7 +313,7 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
     # The slow low-pass widens a stretch, and with it the time for which it is beyond the threshold.
     over = fitted.direction * stretch.fine_qd[span] > shape["threshold"].value
     passed = float(stretch.t[first + int(np.argmax(over))]) if over.any() else np.nan
-    return StretchSeen(
+    return MeasuredStretch(
         file=moments.trial.file,
         configuration=moments.trial.configuration,
         speed=float(along[peak]),

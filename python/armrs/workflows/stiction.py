@@ -39,7 +39,7 @@ def sticking(model: Model) -> Model:
     return model.replace(joints=joints, effects=(*of_joints, *(solved.get(e, e) for e in model.effects)))
 
 
-def sticking_said(model: Model) -> tuple[str, ...]:
+def sticking_warnings(model: Model) -> tuple[str, ...]:
     """Return what `sticking` changes in a model, in a line."""
     laws = [f"{law.kind} in joint {law.joint}" for law, _ in _too_steep(model)]
     if not laws:
@@ -48,7 +48,7 @@ def sticking_said(model: Model) -> tuple[str, ...]:
     return (f"{', '.join(laws)}: {why}, so solved as set-valued friction, which sticks.",)
 
 
-def too_steep_said(model: Model, dt: float) -> tuple[str, ...]:
+def too_steep_warnings(model: Model, dt: float) -> tuple[str, ...]:
     """Return what `sticking` would change in a model that is simulated as it is, with steps of `dt` [s], in a line."""
     laws = [f"{law.kind} in joint {law.joint}" for law, _ in _too_steep(model, dt)]
     if not laws:

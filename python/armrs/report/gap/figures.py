@@ -12,7 +12,7 @@ from ..._armrs import Missing, Suspect
 from ...formatting import read_in
 from ...workflows.gap import residual_maps
 from ...workflows.gap.core_input import channel_names, is_led
-from ...workflows.gap.effect_curves import Portrait, portrait, telling_trial
+from ...workflows.gap.effect_curves import EffectCurve, effect_curve, telling_trial
 from ...workflows.gap.gap_result import GapFound
 from .. import plotting
 from ..figures import Drawn, Figures, slug
@@ -174,7 +174,7 @@ def _search_trace(result: GapFound) -> Drawn:
 
 def _effect(result: GapFound, number: int, effect: Missing) -> Drawn:
     """Draw one effect by itself: its law along the movements with its interval, and what it changes in the channels."""
-    seen = portrait(result, effect)
+    seen = effect_curve(result, effect)
     rows = np.empty((0, 0)) if seen.changed is None else seen.changed
     changed = [c for c in range(rows.shape[1]) if np.abs(rows[:, c]).max() > _ROUNDING]
     names = channel_names(result.dataset, is_led(result.dataset))
@@ -217,7 +217,7 @@ def _name_of(number: int, effect: Missing) -> str:
     return f"effect-{number + 1}-{slug(place_of(effect.kind, effect.joint, effect.channel)).lower()}"
 
 
-def _law(ax: Axes, seen: Portrait, torque: np.ndarray) -> None:
+def _law(ax: Axes, seen: EffectCurve, torque: np.ndarray) -> None:
     factor, unit = read_in({"angle": "rad", "speed": "rad/s"}.get(seen.against, "s"))
     x = seen.x * factor
     there = np.isfinite(seen.data)

@@ -136,7 +136,7 @@ def _how(alternative: Mapping[str, Any]) -> str:
     return f"{alternative['why']}, by {size} units {'less' if worse > 0.0 else 'more'}"
 
 
-def apart(result: Mapping[str, Any]) -> list[str]:
+def single_trial_lines(result: Mapping[str, Any]) -> list[str]:
     """Return what was in one trial only, a line each."""
     lines = []
     for effect in result["effects"]:
@@ -182,7 +182,7 @@ def show(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
     """Print what the workflow found."""
     common.head(result, verdict(result))
     common.show(heading(result), missing(result))
-    if lines := [*others(result), *apart(result)]:
+    if lines := [*others(result), *single_trial_lines(result)]:
         print("\n".join(lines) + "\n")
     common.show("Gap on the test trials: root mean square of simulated minus measured", gap(result))
     if result["gap"]:

@@ -18,9 +18,9 @@ from .core_input import core_settings, core_trials
 from .unresolved_motion import unresolved
 
 _BY_TORQUES = "so all trials are compared by joint torques in measured motion"
-_NOT_TOLD = "The contact, the robot, a first joint that moves, tremor and bursts cannot be tested that way"
+_NOT_TESTED = "The contact, the robot, a first joint that moves, tremor and bursts cannot be tested that way"
 _NO_FORCES = "nor can errors of the force sensor, its misalignment and its delay"
-_APART = 0.01
+_OFF_HANDLE = 0.01
 """Mean distance of hand and handle from which on it is reported [m]: ten times the default placement of the handle."""
 _LONG = 5
 """Samples in a row at one and the same extreme value from which on a channel may be saturated."""
@@ -52,7 +52,7 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
 def tests() -> tuple[Callable[[Dataset, bool], list[str]], ...]:
     """Return the tests of `examine`, each by itself: of a data set and whether a robot leads the arm, lines or a refusal."""
     return (
-        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _apart, _other_weight, _still_joints, _moving_starts,
+        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _off_handle, _other_weight, _still_joints, _moving_starts,
         unresolved, _uneven_repeats, _saturated,
     )  # fmt: skip
 
@@ -86,16 +86,18 @@ def _wrong_setup(dataset: Dataset, led: bool) -> list[str]:
     return examine_setup(dataset)
 
 
-def _apart(dataset: Dataset, led: bool) -> list[str]:
+def _off_handle(dataset: Dataset, led: bool) -> list[str]:
     """Return that hand and handle are apart on average: a base or a length is wrong by centimetres, which would be named as an effect.
 
     A soft contact deflects by millimetres.
     """
     gap = mean_gap(dataset)
-    if gap is None or float(np.hypot(*gap)) < _APART:
+    if gap is None or float(np.hypot(*gap)) < _OFF_HANDLE:
         return []
     forward, up = 1e3 * gap
-    return [f"hand and handle: {forward:+.0f} mm forward and {up:+.0f} mm up from each other on average, allowed {1e3 * _APART:.0f} mm"]
+    return [
+        f"hand and handle: {forward:+.0f} mm forward and {up:+.0f} mm up from each other on average, allowed {1e3 * _OFF_HANDLE:.0f} mm"
+    ]
 
 
 def _other_weight(dataset: Dataset, led: bool) -> list[str]:
@@ -108,16 +110,16 @@ def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
     if led or not any(t.force_on_arm is not None for t in dataset.trials):
         return []
     forces = ", ".join(t.file for t in dataset.trials if t.force_on_arm is None)
-    not_told = f"{_NOT_TOLD}; {_NO_FORCES}" if forces else _NOT_TOLD
+    not_tested = f"{_NOT_TESTED}; {_NO_FORCES}" if forces else _NOT_TESTED
     absent = {
         "[robot] in the model": dataset.model.robot is None,
         "robot angles (qr1, qr2)": not any(t.robot_q is not None for t in dataset.trials),
     }
     if any(absent.values()):
-        return [f"no {' and no '.join(name for name, lacks in absent.items() if lacks)}: {_BY_TORQUES}. {not_told}"]
+        return [f"no {' and no '.join(name for name, lacks in absent.items() if lacks)}: {_BY_TORQUES}. {not_tested}"]
     angles = ", ".join(t.file for t in dataset.trials if t.robot_q is None)
     missing = [f"no {what} in {files}" for what, files in (("robot angles", angles), ("contact forces", forces)) if files]
-    return [f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack. {not_told}"]
+    return [f"{'; '.join(missing)}: {_BY_TORQUES}; leave such trials out, or add what they lack. {not_tested}"]
 
 
 def _still_joints(dataset: Dataset, led: bool) -> list[str]:

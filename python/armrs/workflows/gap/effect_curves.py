@@ -21,7 +21,7 @@ _FEWEST = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Portrait:
+class EffectCurve:
     """One effect by itself.
 
     Attributes
@@ -54,12 +54,12 @@ class Portrait:
     changed: np.ndarray | None
 
 
-def portrait(result: GapFound, effect: Missing) -> Portrait:
+def effect_curve(result: GapFound, effect: Missing) -> EffectCurve:
     """Return one effect of a result by itself."""
     own = _own(result, effect)
     trial, t, changed = _changed(result, effect, own)
     empty = np.empty(0)
-    shown = Portrait("time", empty, None, empty, empty, empty, empty, trial, t, changed)
+    shown = EffectCurve("time", empty, None, empty, empty, empty, empty, trial, t, changed)
     if catalogue()[effect.kind].where != "joint" or effect.joint is None or effect.trial is not None:
         return shown
     return _law(result, effect, own, shown)
@@ -105,7 +105,7 @@ def _ends(effect: Missing, own: Effect) -> list[Effect]:
     return [own.replace(parameters=_values(effect, {**own.parameters, size: end})) for end in interval]
 
 
-def _law(result: GapFound, effect: Missing, own: Effect, shown: Portrait) -> Portrait:
+def _law(result: GapFound, effect: Missing, own: Effect, shown: EffectCurve) -> EffectCurve:
     """Return the effect's torque along the fit trials, averaged over cells of what it follows most closely."""
     joint = (effect.joint or 1) - 1
     found = [

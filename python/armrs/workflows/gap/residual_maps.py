@@ -18,7 +18,7 @@ _MOVING = 0.1
 """Share of a joint's fastest speed in a trial below which it counts as resting."""
 _FEWEST = 16
 """Fewest samples of a region that is compared."""
-_SEEN = 3
+_LEAST_SAMPLES = 3
 """Samples of one trial below which a cell of a map was not visited."""
 
 
@@ -153,7 +153,7 @@ def residual_map(found: Sequence[Discrepancy], joint: int, cells: tuple[int, int
         count, total = np.zeros((cells[1], cells[0])), np.zeros((cells[1], cells[0]))
         np.add.at(count, (row, column), 1.0)
         np.add.at(total, (row, column), d.torque[valid, joint])
-        means.append(np.where(count >= _SEEN, total / np.maximum(count, 1.0), np.nan))
+        means.append(np.where(count >= _LEAST_SAMPLES, total / np.maximum(count, 1.0), np.nan))
     trials = np.array(means)
     there = np.isfinite(trials)
     number = there.sum(axis=0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...analysis.torque_balance import BALANCED, Motion, motion_of, unexplained
 from ...errors import BadInput, Text
-from ...io.column_conventions import Reading
+from ...io.column_conventions import AlternativeConvention
 from ...model import Model
 from .recipe import REFERENCES, ZEROS, Convention
 
@@ -161,10 +161,12 @@ def _equivalent(a: Convention, b: Convention, motion: Motion | None) -> bool:
     return bool(np.abs(to_model_angles(motion.q, a) - to_model_angles(motion.q, b)).max() < 1e-3)
 
 
-def _reading(c: Convention, n: int) -> Reading:
+def _reading(c: Convention, n: int) -> AlternativeConvention:
     """Return how a convention makes angles of the model, and the force on the arm, of what was recorded."""
     shift = to_model_angles(np.zeros((1, n)), c)[0]
-    return Reading("", "", to_model_angles(np.eye(n), c).T - shift[:, None], shift, np.eye(2) * (1.0 if c.force_on == "arm" else -1.0))
+    return AlternativeConvention(
+        "", "", to_model_angles(np.eye(n), c).T - shift[:, None], shift, np.eye(2) * (1.0 if c.force_on == "arm" else -1.0)
+    )
 
 
 def to_model_speeds(raw: np.ndarray, convention: Convention) -> np.ndarray:

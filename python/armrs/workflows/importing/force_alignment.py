@@ -12,7 +12,7 @@ from ...errors import BadInput
 from ...io.files import first_of
 from ...model import Model
 from . import clock_offset, conventions, file_roles, offset_search
-from .raw_trial import Read, angles_of, arrays, by, forces_of, values
+from .raw_trial import LoadedTrial, angles_of, arrays, by, forces_of, values
 from .recipe import Channel, Convention, RawTrial
 
 _LIKELY = 6
@@ -23,14 +23,14 @@ _CLEAR = 0.05
 
 def aligned(
     named: Sequence[file_roles.Named], channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
-) -> list[Read]:
+) -> list[LoadedTrial]:
     """Return trials with their forces near the clock of their angles: where the movement explains them best."""
     reads = []
     for n in named:
         trial = RawTrial(os.fspath(n.table.path), n.table.title, n.configuration, n.repeat, n.role)
         if n.forces is not None:
             trial = changed(trial, force_file=os.fspath(n.forces.path), force_table=n.forces.title, force_shift=0.0)
-        reads.append(Read(trial, n.table, n.forces))
+        reads.append(LoadedTrial(trial, n.table, n.forces))
     apart, matches = [k for k, read in enumerate(reads) if read.forces is not None], []
     for read in (reads[k] for k in apart):
         t, q = values(read.table, by(channels, "t")), angles_of(read, channels)
@@ -50,7 +50,7 @@ def aligned(
     return reads
 
 
-def _unexplained(read: Read, channels: Sequence[Channel], model: Model, given: Mapping[str, object]) -> float:
+def _unexplained(read: LoadedTrial, channels: Sequence[Channel], model: Model, given: Mapping[str, object]) -> float:
     """Return what a trial leaves unexplained in the convention that suits its clock best, after that was refined in it."""
     t, q, force = arrays(read, channels, model.n_joints)
     if force is None:
@@ -62,7 +62,7 @@ def _unexplained(read: Read, channels: Sequence[Channel], model: Model, given: M
     return min(found.unexplained, conventions.ranked(model, [(t, q, force)], given)[0].unexplained) if force is not None else 1.0
 
 
-def _recording(read: Read, channels: Sequence[Channel], convention: Convention) -> clock_offset.Recording:
+def _recording(read: LoadedTrial, channels: Sequence[Channel], convention: Convention) -> clock_offset.Recording:
     """Return a trial as `clock` takes it."""
     t, q = values(read.table, by(channels, "t")), conventions.to_model_angles(angles_of(read, channels), convention)
     clock_of_forces, own = forces_of(read, channels)
@@ -72,8 +72,8 @@ def _recording(read: Read, channels: Sequence[Channel], convention: Convention) 
 
 
 def settled(
-    reads: Sequence[Read], channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
-) -> tuple[list[Read], Convention, list[str], list[str]]:
+    reads: Sequence[LoadedTrial], channels: Sequence[Channel], model: Model, given: Mapping[str, object], problems: list[BadInput]
+) -> tuple[list[LoadedTrial], Convention, list[str], list[str]]:
     """Return trials on the clock of their angles, the convention in which the arm balances, remarks on clocks; doubts."""
     lines, doubts = list[str](), list[str]()
     apart = [k for k, read in enumerate(reads) if read.forces is not None]
@@ -85,8 +85,8 @@ def settled(
 
 
 def _matched(
-    reads: Sequence[Read], apart: Sequence[int], channels: Sequence[Channel], model: Model, given: Mapping[str, object]
-) -> list[Read]:
+    reads: Sequence[LoadedTrial], apart: Sequence[int], channels: Sequence[Channel], model: Model, given: Mapping[str, object]
+) -> list[LoadedTrial]:
     """Return trials near the clock of their angles in the likely convention that then leaves least unexplained.
 
     With wrong clocks, the arm may balance better in a wrong convention: so the clocks are found in each that is likely.
@@ -106,8 +106,8 @@ def _matched(
 
 
 def _refined(
-    reads: Sequence[Read], channels: Sequence[Channel], convention: Convention, model: Model
-) -> tuple[list[Read], list[str], list[str]]:
+    reads: Sequence[LoadedTrial], channels: Sequence[Channel], convention: Convention, model: Model
+) -> tuple[list[LoadedTrial], list[str], list[str]]:
     """Return trials with their forces on the clock of the angles, by the equation of motion; remarks on it; doubts."""
     apart = [k for k, read in enumerate(reads) if read.forces is not None]
     recordings = [_recording(reads[k], channels, convention) for k in apart]
@@ -131,7 +131,7 @@ def _refined(
 
 
 def _decided(
-    reads: Sequence[Read],
+    reads: Sequence[LoadedTrial],
     channels: Sequence[Channel],
     model: Model,
     given: Mapping[str, object],
@@ -142,5 +142,5 @@ def _decided(
     return conventions.decide(model, _recorded(reads, channels, model), given, problems, doubts)
 
 
-def _recorded(reads: Sequence[Read], channels: Sequence[Channel], model: Model) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _recorded(reads: Sequence[LoadedTrial], channels: Sequence[Channel], model: Model) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return [(t, q, f) for t, q, f in (arrays(read, channels, model.n_joints) for read in reads) if f is not None]

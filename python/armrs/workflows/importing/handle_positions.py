@@ -10,7 +10,7 @@ from ...errors import BadInput, Text
 from ...io.plausibility import hand_path
 from ...model import Model, Robot
 
-_APART = 0.05
+_LARGEST_DISTANCE = 0.05
 """Largest distance of hand and handle, relative to the arm's length: positions farther away have another origin."""
 
 _HELD = 0.02
@@ -19,7 +19,7 @@ _STIFFNESS = 10_000.0
 """Of a contact that the model does not state, as everywhere [N/m]."""
 _SLIPPED = 2.0
 """A trial that leaves so many times what the middle one does is not used."""
-_TOLD = 1e-3
+_RANK_TOLERANCE = 1e-3
 """Smallest singular value, relative to the largest, with which movements determine lengths and base of a robot."""
 
 
@@ -41,13 +41,13 @@ def origin(model: Model, trials: Sequence[tuple[np.ndarray, np.ndarray]]) -> tup
     reach = sum(s.length for s in model.segments)
     away = np.concatenate([hand_path(model, q) - position for q, position in trials])
     away = away[np.isfinite(away).all(axis=1)]
-    if _rms(away) <= _APART * reach:
+    if _rms(away) <= _LARGEST_DISTANCE * reach:
         return 0.0, 0.0
     middle = away.mean(axis=0)
-    if _rms(away - middle) > _APART * reach:
+    if _rms(away - middle) > _LARGEST_DISTANCE * reach:
         found = Text(f"positions of the handle that leave the hand by {_rms(away - middle):.2g} m, wherever their origin is")
         hint = "another axis or direction? --map Py=-COLUMN turns one; a model with other lengths?"
-        raise BadInput("columns", found, f"at most {_APART * reach:.2g} m", hint=hint)
+        raise BadInput("columns", found, f"at most {_LARGEST_DISTANCE * reach:.2g} m", hint=hint)
     return float(middle[0]), float(middle[1])
 
 
@@ -133,7 +133,7 @@ def _handle_system(hand: np.ndarray, qr: np.ndarray) -> np.ndarray:
 def _solved(systems: Sequence[np.ndarray]) -> tuple[np.ndarray, int, np.ndarray]:
     """Return the least squares of all trials, the number of determined parameters, and the distance (RMS) left in each trial [m]."""
     rows = np.concatenate(systems)
-    found, _, rank, _ = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=_TOLD)
+    found, _, rank, _ = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=_RANK_TOLERANCE)
     left = [np.sqrt(2.0 * np.mean((s[:, :-1] @ found - s[:, -1]) ** 2)) for s in systems]
     return found, int(rank), np.array(left)
 

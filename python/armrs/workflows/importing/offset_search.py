@@ -33,7 +33,7 @@ _EXPLAINED = 0.6
 """Least share of the force's variance that the movement must explain: less is no match."""
 _ROUNDS = 6
 """Rounds in which the offset of each recording is searched for beside those of the others."""
-_STARTS, _APART = 4, 0.35
+_STARTS, _LEAST_SEPARATION = 4, 0.35
 """Recordings that the search begins with, the clearest ones: of which offsets so far [s] from the best are the worst."""
 _RIDGE = 1e-9
 """Regressors that cannot be distinguished share what they explain; relative to their size."""
@@ -246,7 +246,7 @@ def _sharpness(match: Match) -> float:
     """Return how many times more the second best offset of a recording leaves than the best."""
     left = match.own()
     first = match.peaks(left)
-    apart = np.abs(match.shifts - first[0]) > _APART if first else np.zeros(len(left), dtype=bool)
+    apart = np.abs(match.shifts - first[0]) > _LEAST_SEPARATION if first else np.zeros(len(left), dtype=bool)
     return float(left[apart].min() / max(left.min(), 1e-300)) if apart.any() else float("inf")
 
 

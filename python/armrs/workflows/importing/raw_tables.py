@@ -17,7 +17,7 @@ from . import column_guess, joint_markers
 _AXES = ("x", "y", "z")
 _PROJECTED = {"Fy": "force forward", "Fz": "force upward", "Mx": "moment about the normal"}
 """Names of the columns of what is projected onto the plane of the movement."""
-_SAID = {"F": "forward is {}, up is {}", "M": "the normal of the plane is {}"}
+_AXES_STATED = {"F": "forward is {}, up is {}", "M": "the normal of the plane is {}"}
 _MOST = 5
 """Files that a line names at most."""
 
@@ -192,5 +192,5 @@ def _projected(own: Sequence[RawColumn], plane: np.ndarray) -> tuple[list[RawCol
         kept += [RawColumn(_PROJECTED[n], n, parts[0].unit, in_file @ d) for n, d in zip(names, directions, strict=True)]
         words = (f"({' '.join(f'{value + 0.0:+.3f}' for value in np.round(d, 3) + 0.0)})" for d in directions)
         names_of = ", ".join(sorted(c.name for c in parts))
-        notes.append(f"{said}: {names_of} are taken in the axes of the markers; {_SAID[kind].format(*words)}")
+        notes.append(f"{said}: {names_of} are taken in the axes of the markers; {_AXES_STATED[kind].format(*words)}")
     return kept, notes

@@ -15,7 +15,7 @@ from .recipe import Channel, RawTrial
 
 
 @dataclass(frozen=True)
-class Read:
+class LoadedTrial:
     """A trial with its raw tables."""
 
     trial: RawTrial
@@ -43,7 +43,7 @@ def values(table: RawTable, channel: Channel) -> np.ndarray:
     return raw if factor == 1.0 else raw * factor
 
 
-def arrays(read: Read, channels: Sequence[Channel], n_joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+def arrays(read: LoadedTrial, channels: Sequence[Channel], n_joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Return time, raw angles and raw force of a trial."""
     t = values(read.table, by(channels, "t"))
     q = np.column_stack([values(read.table, by(channels, f"q{j}")) for j in range(1, n_joints + 1)])
@@ -52,19 +52,19 @@ def arrays(read: Read, channels: Sequence[Channel], n_joints: int) -> tuple[np.n
     return t, q, np.column_stack([on_clock(read, t, channels, s) for s in ("Fy", "Fz")])
 
 
-def angles_of(read: Read, channels: Sequence[Channel]) -> np.ndarray:
+def angles_of(read: LoadedTrial, channels: Sequence[Channel]) -> np.ndarray:
     """Return the raw angles of a trial [rad]."""
     return np.column_stack([values(read.table, c) for c in channels if c.symbol.startswith("q") and c.symbol[1:].isdigit()])
 
 
-def forces_of(read: Read, channels: Sequence[Channel]) -> tuple[np.ndarray, np.ndarray]:
+def forces_of(read: LoadedTrial, channels: Sequence[Channel]) -> tuple[np.ndarray, np.ndarray]:
     """Return time [s] and raw forces [N] of a recording of forces, by its own clock."""
     if read.forces is None:
         raise ValueError(read.trial.file)
     return values(read.forces, by(channels, "t of forces")), np.column_stack([values(read.forces, by(channels, s)) for s in ("Fy", "Fz")])
 
 
-def on_clock(read: Read, t: np.ndarray, channels: Sequence[Channel], symbol: str) -> np.ndarray:
+def on_clock(read: LoadedTrial, t: np.ndarray, channels: Sequence[Channel], symbol: str) -> np.ndarray:
     """Return a channel in SI units at the times of the angles."""
     channel = by(channels, symbol)
     if read.forces is None or symbol[0] not in "FM":

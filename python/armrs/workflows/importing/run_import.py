@@ -24,12 +24,12 @@ from ...tabular import Tabular, Tidy
 from . import column_guess, conventions, file_remarks, file_roles, force_alignment, handle_positions
 from . import raw_tables as raw
 from .column_guess import symbol_of
-from .raw_trial import Read, arrays, by, on_clock, values
+from .raw_trial import LoadedTrial, arrays, by, on_clock, values
 from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
 from .sample_cleaning import cleaned
 
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
-_TOLD_BY = "BadInputs.problems holds"
+_PROBLEMS_HINT = "BadInputs.problems holds"
 _READ, _DECIDED = 0.5, 0.9
 """Shares of the work after which recordings are read, and after which conventions are decided."""
 _NAMED = 8
@@ -183,7 +183,7 @@ def _about(model: Path) -> tuple[Subject, Tolerance]:
     return (found.subject, found.tolerance) if mine else (Subject(), Tolerance())
 
 
-def _led(model: Model, recipe: Recipe, reads: Sequence[Read]) -> tuple[Model, list[str]]:
+def _led(model: Model, recipe: Recipe, reads: Sequence[LoadedTrial]) -> tuple[Model, list[str]]:
     """Return a model with the robot that the recorded angles show, where it has none, and remarks on that."""
     channels = recipe.channels
     if model.robot is not None or not {"qr1", "qr2"} <= {c.symbol for c in channels}:
@@ -227,7 +227,7 @@ def _decided(
     points: tuple[str, ...],
     rate: float | None,
     tell: Callable[[str, float], None],
-) -> tuple[Recipe, list[Read], list[str], list[str]]:
+) -> tuple[Recipe, list[LoadedTrial], list[str], list[str]]:
     """Return the contents of all files; every problem is collected before any is raised."""
     problems: list[BadInput] = []
     sought = 0 if any(symbol.startswith("q") for symbol in mapped) else model.n_joints
@@ -248,7 +248,7 @@ def _decided(
         for table in mapped_tables[:1]:
             _complete(column_guess.guess([table], _present(mapped, table), problems), model.n_joints, table, problems)
     if not named:
-        raise BadInputs.of(problems, _TOLD_BY)
+        raise BadInputs.of(problems, _PROBLEMS_HINT)
     for table in left:
         if table.path in sources.in_folders:
             sources.notes.append(f"left out, since it holds neither joint angles nor forces: {table.path}")
@@ -274,7 +274,7 @@ def _decided(
     _alike([n.table for n in named], [c for c in channels if not force_tables or c.symbol[0] not in "FM"], problems)
     _alike(force_tables, [c for c in channels if c.symbol[0] in "FM"], problems)
     if len(problems) > of_files:
-        raise BadInputs.of(problems, _TOLD_BY)
+        raise BadInputs.of(problems, _PROBLEMS_HINT)
     tell("finding clocks and conventions", _READ)
     reads = force_alignment.aligned(named, channels, model, given, problems)
     clocks, doubts = list[str](), list[str]()
@@ -285,7 +285,7 @@ def _decided(
         why = "no contact force, so the balance cannot be used: the angles are taken in the convention of armrs"
         convention = Convention(str(given.get("reference", "relative")), str(given.get("zero", "horizontal")), signs, None, why)  # type: ignore[arg-type]
     if problems:
-        raise BadInputs.of(problems, _TOLD_BY)
+        raise BadInputs.of(problems, _PROBLEMS_HINT)
     origin = _origin(reads, channels, convention, model, axes)
     recipe = Recipe(tuple(channels), convention, tuple(r.trial for r in reads), sources.points, origin, rate)
     notes = [*sources.notes, *file_remarks.said(tables), *projected, *axes, *partial]
@@ -333,7 +333,7 @@ def _alike(tables: Sequence[RawTable], channels: Sequence[Channel], problems: li
 
 
 def _origin(
-    reads: Sequence[Read], channels: Sequence[Channel], convention: Convention, model: Model, notes: list[str]
+    reads: Sequence[LoadedTrial], channels: Sequence[Channel], convention: Convention, model: Model, notes: list[str]
 ) -> tuple[float, float] | None:
     """Return the origin of the handle's positions, None where there are none or the model has no robot."""
     if not {"Py", "Pz"} <= {c.symbol for c in channels} or any(c.symbol == "qr1" for c in channels):
@@ -351,7 +351,7 @@ def _origin(
     return y, z
 
 
-def _positions(read: Read, channels: Sequence[Channel]) -> np.ndarray:
+def _positions(read: LoadedTrial, channels: Sequence[Channel]) -> np.ndarray:
     return np.column_stack([values(read.table, by(channels, symbol)) for symbol in ("Py", "Pz")])
 
 
@@ -429,7 +429,7 @@ def _complete(channels: Sequence[Channel], n_joints: int, table: RawTable, probl
             problems.append(BadInput("columns", found, allowed, file=table.path))
 
 
-def _remarks(read: Read, channels: Sequence[Channel]) -> tuple[str, ...]:
+def _remarks(read: LoadedTrial, channels: Sequence[Channel]) -> tuple[str, ...]:
     """Return the remarks beside the samples of a trial, on the clock of its angles."""
     own = file_remarks.timed(read.table, values(read.table, by(channels, "t")))
     if read.forces is None:
@@ -437,7 +437,7 @@ def _remarks(read: Read, channels: Sequence[Channel]) -> tuple[str, ...]:
     return (*own, *file_remarks.timed(read.forces, values(read.forces, by(channels, "t of forces")) + read.trial.force_shift))
 
 
-def _reread(recipe: Recipe, folder: Path) -> list[Read]:
+def _reread(recipe: Recipe, folder: Path) -> list[LoadedTrial]:
     """Return the trials of a recipe with their tables."""
     problems: list[BadInput] = []
     reads = []
@@ -458,17 +458,19 @@ def _reread(recipe: Recipe, folder: Path) -> list[Read]:
             own = table_of(trial.force_file, trial.force_table, ()) if trial.force_file else None
             if own is not None and any(own.find(c.column) is None for c in recipe.channels if c.symbol == "Fy"):
                 own = raw.in_plane(own, table)
-            reads.append(Read(trial, table, own))
+            reads.append(LoadedTrial(trial, table, own))
         except BadInput as error:
             problems.append(error)
     if problems:
-        raise BadInputs.of(problems, _TOLD_BY)
+        raise BadInputs.of(problems, _PROBLEMS_HINT)
     return reads
 
 
-def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[Read], about: tuple[Subject, Tolerance]) -> Path:
+def _write(
+    folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[LoadedTrial], about: tuple[Subject, Tolerance]
+) -> Path:
     """Write the data set whole or not at all, with `import.toml` in it, and remove the other trials of a former import."""
-    kept = changed(recipe, trials=tuple(_seen_from(folder, read.trial) for read in reads))
+    kept = changed(recipe, trials=tuple(_relative_to(folder, read.trial) for read in reads))
 
     def write(part: Path) -> list[Path]:
         written = []
@@ -515,14 +517,14 @@ def _name_of(trial: RawTrial) -> str:
     return f"trials/{trial.configuration}_{trial.repeat}.csv"
 
 
-def _seen_from(folder: Path, trial: RawTrial) -> RawTrial:
+def _relative_to(folder: Path, trial: RawTrial) -> RawTrial:
     """Return a trial whose files are named relative to the folder that `import.toml` is in."""
     here = folder.resolve()
     force_file = None if trial.force_file is None else os.path.relpath(Path(trial.force_file).resolve(), here)
     return changed(trial, file=os.path.relpath(Path(trial.file).resolve(), here), force_file=force_file)
 
 
-def _si_columns(read: Read, recipe: Recipe, n_joints: int, robot: Robot | None) -> dict[str, np.ndarray]:
+def _si_columns(read: LoadedTrial, recipe: Recipe, n_joints: int, robot: Robot | None) -> dict[str, np.ndarray]:
     """Return the columns of a trial file: SI units, the angles of armrs, the sign of `force_on`."""
     t, q, force = arrays(read, recipe.channels, n_joints)
     angles = conventions.to_model_angles(q, recipe.convention)
