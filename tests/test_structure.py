@@ -91,7 +91,7 @@ def test_folders_do_not_know_what_is_above_them() -> None:
         "cli": {"__main__"},
         "montecarlo": {"cli"},
     }
-    shared = {"anthropometry", "catalogue", "custom_effects", "errors", "model", "result_warnings", "tabular", "validation"}
+    shared = {"anthropometry", "catalogue", "checks", "custom_effects", "errors", "model", "result_warnings", "tabular"}
     below = {"io": {"io", "view_registry", *shared}, "analysis": {"analysis", "io", *shared}}
     for name, used in structure.python_imports(PACKAGE).items():
         room = name.split(".")[1]

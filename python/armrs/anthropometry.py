@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from . import _armrs, validation
+from . import _armrs, checks
 from .errors import BadInput, Text
 from .model import Joint, Model, Segment, Subject
 
@@ -79,21 +79,21 @@ def segment_expectations(
     >>> round(armrs.segment_expectations(78.0, 1.80, "male", [0.322])[0].mass[0], 3)
     2.114
     """
-    body_mass = validation.number("body_mass", body_mass, least=1.0, most=500.0, unit="kg")
-    height = validation.number("height", height, least=0.3, most=3.0, unit="m", hint="centimetres?")
-    validation.choice("sex", sex, ("male", "female"))
+    body_mass = checks.number("body_mass", body_mass, least=1.0, most=500.0, unit="kg")
+    height = checks.number("height", height, least=0.3, most=3.0, unit="m", hint="centimetres?")
+    checks.choice("sex", sex, ("male", "female"))
     check_lengths(lengths)
     return tuple(Expected(**item) for item in _armrs.literature(body_mass, height, sex, list(lengths)))
 
 
 def check_lengths(lengths: Sequence[float | None]) -> None:
     """Refuse what are no lengths of one to three segments [m], None where one is scaled with height."""
-    validation.instance("lengths", lengths, list, tuple)
+    checks.instance("lengths", lengths, list, tuple)
     if not 1 <= len(lengths) <= len(SEGMENTS):
         raise BadInput("lengths", Text(f"{len(lengths)} lengths"), f"1 to {len(SEGMENTS)}: {', '.join(SEGMENTS)}")
     for k, length in enumerate(lengths, start=1):
         if length is not None:
-            validation.number(f"lengths, {k}", length, above=0.0, most=1.0, unit="m", hint="centimetres or millimetres?")
+            checks.number(f"lengths, {k}", length, above=0.0, most=1.0, unit="m", hint="centimetres or millimetres?")
 
 
 def literature_model(subject: Subject, lengths: Sequence[float | None] | None = None) -> Model:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any
 
-from . import validation
+from . import checks
 
 FORCE_CHANNELS = ("Fy", "Fz", "Mx")
 """Channels of the force sensor in the order of the core."""
@@ -45,13 +45,13 @@ class Parameter:
     or_zero: bool = False
 
     def __post_init__(self) -> None:
-        validation.text("name", self.name)
-        validation.instance("unit", self.unit, str)
+        checks.text("name", self.name)
+        checks.instance("unit", self.unit, str)
         for name in ("min", "max"):
-            validation.extent(name, getattr(self, name))
-        validation.number("default", self.default)
-        validation.flag("linear", self.linear)
-        validation.flag("or_zero", self.or_zero)
+            checks.extent(name, getattr(self, name))
+        checks.number("default", self.default)
+        checks.flag("linear", self.linear)
+        checks.flag("or_zero", self.or_zero)
 
 
 @dataclass(frozen=True)

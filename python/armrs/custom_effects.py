@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import _armrs, validation
+from . import _armrs, checks
 from .catalogue import Parameter, catalogue
 from .errors import BadInput, Text
 from .model import Effect, Joint, Model, Segment
@@ -88,22 +88,22 @@ def own_effect(
     For each set of shapes and each linear parameter the law is tabulated once, at 513 equally spaced angles and 257 speeds, 7e-4 rad/s
     apart at rest and 7 % beyond, and interpolated with cubics: some ms in NumPy. A jump in the law becomes a slope over one cell.
     """
-    listed = validation.instances("parameters", parameters, Parameter)
+    listed = checks.instances("parameters", parameters, Parameter)
     for name, said in (("summary", summary), ("formula", formula)):
-        validation.instance(name, said, str)
+        checks.instance(name, said, str)
     _check(kind, listed)
     names = [p.name for p in listed]
     count = len([p for p in listed if p.linear])
     _takes(law, names)
     low, high = _ends(angles)
-    fastest = validation.number("speed", speed, above=KNEE, most=1e4, unit="rad/s")
+    fastest = checks.number("speed", speed, above=KNEE, most=1e4, unit="rad/s")
     at = _evaluated(kind, law, names)
 
     def tabulate(q: np.ndarray, qd: np.ndarray, values: np.ndarray) -> np.ndarray:
         angle, rate = np.meshgrid(q, qd, indexing="ij")
         return np.ascontiguousarray([at(angle, rate, _one(values, k, count)) for k in range(count)])
 
-    tried = {} if shapes is None else {n: validation.numbers(f"shapes, {n}", v) for n, v in validation.table("shapes", shapes).items()}
+    tried = {} if shapes is None else {n: checks.numbers(f"shapes, {n}", v) for n, v in checks.table("shapes", shapes).items()}
     for name in tried:
         if name not in names[count:]:
             raise BadInput("shapes", name, f"one of the parameters that are not linear: {', '.join(names[count:]) or 'none'}")
@@ -127,7 +127,7 @@ def own_effect(
 
 def _ends(angles: tuple[float, float]) -> tuple[float, float]:
     """Return the smallest and largest angle of a table [rad]."""
-    low, high = validation.pair("angles", angles, least=-50.0, most=50.0, unit="rad", hint="looks like degrees")
+    low, high = checks.pair("angles", angles, least=-50.0, most=50.0, unit="rad", hint="looks like degrees")
     if not low < high:
         raise BadInput("angles", Text(f"{low:g} to {high:g} rad"), "the smaller angle first")
     return low, high
@@ -149,7 +149,7 @@ def _evaluated(kind: str, law: Law, names: Sequence[str]) -> Callable[[np.ndarra
 
 
 def _check(kind: str, parameters: tuple[Parameter, ...]) -> None:
-    validation.text("kind", kind)
+    checks.text("kind", kind)
     if not parameters or not parameters[0].linear:
         raise BadInput("parameters", Text("none that the torque is linear in"), "one such first: the size of the effect")
     flags = [p.linear for p in parameters]

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..fmu.bundled_libraries import collected
 from ..fmu.slave_interface import Variable
 from ..io import files
@@ -70,12 +70,12 @@ def export_fmu(
     BadInput
         For an arm, a name or a library that cannot be used; nothing is written.
     """
-    target = validation.path("path", path)
-    validation.text("path", target.stem)
+    target = checks.path("path", path)
+    checks.text("path", target.stem)
     files.may_replace(target, ".fmu")
-    if not validation.flag("replace", replace):
+    if not checks.flag("replace", replace):
         files.may_replace_archive(target, ".fmu", _ARM)
-    fmi = validation.whole("fmi", fmi, least=2, most=3)
+    fmi = checks.whole("fmi", fmi, least=2, most=3)
     if not isinstance(model, Slave):
         model = Slave(model, port=port, start=start, rest=rest, name=target.stem if name is None else name)
     content = contents(model, fmi, libraries)

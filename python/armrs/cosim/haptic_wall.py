@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import SlaveError, unknown_name
 from ..fmu.slave_interface import Partner, Status, StepResult, Variable, listed
 
@@ -35,12 +35,12 @@ class Wall(Partner):
     can_rollback = True
 
     def __init__(self, axis: str, position: float, stiffness: float, damping: float = 0.0, *, name: str = "wall") -> None:
-        validation.choice("axis", axis, ("y", "z", "-y", "-z"))
+        checks.choice("axis", axis, ("y", "z", "-y", "-z"))
         self.name = name
         self._axis, self._sign = _AXES[axis[-1]], -1.0 if axis.startswith("-") else 1.0
-        self._position = validation.number("position", position, unit="m")
-        self._stiffness = validation.number("stiffness", stiffness, least=0.0, unit="N/m")
-        self._damping = validation.number("damping", damping, least=0.0, unit="N s/m²")
+        self._position = checks.number("position", position, unit="m")
+        self._stiffness = checks.number("stiffness", stiffness, least=0.0, unit="N/m")
+        self._damping = checks.number("damping", damping, least=0.0, unit="N s/m²")
         self._values = {f"{stem}[{k}]": 0.0 for stem in ("r", "v") for k in (1, 2)}
         inputs = [("r", "m", _METRE), ("v", "m/s", _SPEED)]
         rows = [(f"{stem}[{k}]", "input", unit, powers) for stem, unit, powers in inputs for k in (1, 2)]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from ..fmu.slave_interface import Partner, Status, StepResult, Variable, listed
 from ..model import Model, load_model
@@ -70,20 +70,20 @@ class Slave(Partner):
         name: str | None = None,
     ) -> None:
         if not isinstance(model, Model):
-            name = name or validation.path("model", model, Model).stem
-        model = validation.loaded("model", model, Model, load_model)
-        validation.choice("port", port, PORTS)
-        self.internal_step = validation.number("step", step, above=0.0, unit="s")
+            name = name or checks.path("model", model, Model).stem
+        model = checks.loaded("model", model, Model, load_model)
+        checks.choice("port", port, PORTS)
+        self.internal_step = checks.number("step", step, above=0.0, unit="s")
         self.model = model
-        self.name = validation.text("name", "arm" if name is None else name)
+        self.name = checks.text("name", "arm" if name is None else name)
         self._coupling: dict[str, Any] = {
             "name": self.name,
             "port": port,
             "step": self.internal_step,
             "q": _joints("start", start, model.n_joints),
             "qd": _joints("start_speed", start_speed, model.n_joints),
-            "handle": None if handle is None else list(validation.pair("handle", handle, unit="m")),
-            "rest": validation.flag("rest", rest),
+            "handle": None if handle is None else list(checks.pair("handle", handle, unit="m")),
+            "rest": checks.flag("rest", rest),
         }
         self.port = port
         self._compile()
@@ -189,7 +189,7 @@ class Slave(Partner):
 def _joints(place: str, values: Any, n: int) -> list[float]:
     if values is None:
         return [0.0] * n
-    given: list[float] = validation.numbers(place, values).reshape(-1).tolist()
+    given: list[float] = checks.numbers(place, values).reshape(-1).tolist()
     if len(given) != n:
         raise BadInput(place, Text(f"{len(given)} values"), f"{n}, one a joint")
     return given

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from ..fmu.slave_interface import Partner, Status, StepResult, Variable, listed
 from ..io.samples import read_samples
@@ -138,11 +138,11 @@ class Wave(BuiltInSlave):
         unit: str = "",
         name: str = "signal",
     ) -> None:
-        super().__init__(name, (), [("y", validation.choice("unit", unit, tuple(_UNITS)))])
-        self._shape = validation.choice("shape", shape, self.SHAPES)
-        self._offset, self._amplitude = validation.number("offset", offset), validation.number("amplitude", amplitude)
-        self._frequency = validation.number("frequency", frequency, above=0.0, unit="Hz")
-        self._start = validation.number("start", start, unit="s")
+        super().__init__(name, (), [("y", checks.choice("unit", unit, tuple(_UNITS)))])
+        self._shape = checks.choice("shape", shape, self.SHAPES)
+        self._offset, self._amplitude = checks.number("offset", offset), checks.number("amplitude", amplitude)
+        self._frequency = checks.number("frequency", frequency, above=0.0, unit="Hz")
+        self._start = checks.number("start", start, unit="s")
 
     def outputs(self) -> dict[str, float]:
         """Return the value at the present time."""
@@ -166,12 +166,12 @@ class Recorded(BuiltInSlave):
     def __init__(self, table: dict[str, np.ndarray], *, name: str = "signal") -> None:
         if "t_s" not in table:
             raise BadInput("columns", Text(", ".join(table)), "a column t_s, the time")
-        self._t = validation.numbers("t_s", table["t_s"], "s", shape=(None,))
+        self._t = checks.numbers("t_s", table["t_s"], "s", shape=(None,))
         if len(self._t) < 2 or not np.all(np.diff(self._t) > 0):
             raise BadInput("t_s", Text("times that do not increase"), "two times or more, each later than the one before")
         named = {column: _split(column) for column in table if column != "t_s"}
         super().__init__(name, (), named.values())
-        self._columns = {n: validation.numbers(c, table[c], shape=(len(self._t),)) for c, (n, _) in named.items()}
+        self._columns = {n: checks.numbers(c, table[c], shape=(len(self._t),)) for c, (n, _) in named.items()}
 
     def outputs(self) -> dict[str, float]:
         """Return the values at the present time."""
@@ -197,11 +197,11 @@ class Pid(BuiltInSlave):
     def __init__(
         self, kp: float, ki: float = 0.0, kd: float = 0.0, *, limit: float = math.inf, unit: str = "", of: str = "", name: str = "pid"
     ) -> None:
-        unit, of = validation.choice("unit", unit, tuple(_UNITS)), validation.choice("of", of, tuple(_UNITS))
+        unit, of = checks.choice("unit", unit, tuple(_UNITS)), checks.choice("of", of, tuple(_UNITS))
         rate = {"rad": "rad_s", "m": "m_s"}.get(of, "")
         super().__init__(name, [("target", of), ("measured", of), ("rate", rate)], [("u", unit)])
-        self._gains = [validation.number(key, value, least=0.0) for key, value in (("kp", kp), ("ki", ki), ("kd", kd))]
-        self._limit = math.inf if limit == math.inf else validation.number("limit", limit, above=0.0)
+        self._gains = [checks.number(key, value, least=0.0) for key, value in (("kp", kp), ("ki", ki), ("kd", kd))]
+        self._limit = math.inf if limit == math.inf else checks.number("limit", limit, above=0.0)
         self.states = {"integral": 0.0}
 
     def outputs(self) -> dict[str, float]:
@@ -238,9 +238,9 @@ class Impedance(BuiltInSlave):
     ) -> None:
         ends = [("r", "m"), ("v", "m_s"), ("target.r", "m"), ("target.v", "m_s")]
         super().__init__(name, [(f"{stem}[{k}]", unit) for stem, unit in ends for k in (1, 2)], [(f"F[{k}]", "N") for k in (1, 2)])
-        self._stiffness = validation.number("stiffness", stiffness, least=0.0, unit="N/m")
-        self._damping = validation.number("damping", damping, least=0.0, unit="N s/m")
-        self._target = validation.pair("target_m", target, unit="m")
+        self._stiffness = checks.number("stiffness", stiffness, least=0.0, unit="N/m")
+        self._damping = checks.number("damping", damping, least=0.0, unit="N s/m")
+        self._target = checks.pair("target_m", target, unit="m")
         self.reset()
 
     def outputs(self) -> dict[str, float]:
@@ -269,20 +269,20 @@ def _split(column: str) -> tuple[str, str]:
 def from_table(kind: str, table: dict[str, Any], name: str, folder: os.PathLike[str]) -> Partner:
     """Make a ready partner from its table in SYSTEM.toml."""
     if kind == "pid":
-        validation.keys("pid", table, required=["kp"], optional=["ki", "kd", "limit", "unit", "of"])
+        checks.keys("pid", table, required=["kp"], optional=["ki", "kd", "limit", "unit", "of"])
         return Pid(**table, name=name)
     if kind == "impedance":
-        validation.keys("impedance", table, required=["stiffness"], optional=["damping", "target_m"])
+        checks.keys("impedance", table, required=["stiffness"], optional=["damping", "target_m"])
         settings = {key.removesuffix("_m"): value for key, value in table.items()}
         return Impedance(**settings, name=name)
     if "file" in table:
-        validation.keys("signal", table, required=["file"])
-        path = Path(folder) / validation.text("file", table["file"])
+        checks.keys("signal", table, required=["file"])
+        path = Path(folder) / checks.text("file", table["file"])
         try:
             read = read_samples(path)
             return Recorded(dict(zip(read.names, read.values, strict=True)), name=name)
         except BadInput as error:
             raise error if error.file else error.within(file=path) from None
-    validation.keys("signal", table, required=["shape"], optional=["offset", "amplitude", "frequency_Hz", "start_s", "unit"])
+    checks.keys("signal", table, required=["shape"], optional=["offset", "amplitude", "frequency_Hz", "start_s", "unit"])
     settings = {key.removesuffix("_Hz").removesuffix("_s"): value for key, value in table.items()}
     return Wave(**settings, name=name)

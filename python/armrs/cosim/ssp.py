@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text
 from ..fmu.archive import archive, refuse_xml, unpack, xml_root
 from ..fmu.isolated_slave import IsolatedSlave
@@ -86,7 +86,7 @@ def load_ssp(path: str | os.PathLike[str], *, step: float | None = None, duratio
     BadInput
         Names the file, the element, what was found and what is allowed.
     """
-    source = validation.path("path", path)
+    source = checks.path("path", path)
     if source.suffix.lower() != ".ssp":
         return _of_file(source, source, step, duration)
     with tempfile.TemporaryDirectory(prefix="armrs-ssp-") as place:
@@ -202,7 +202,7 @@ def _connect(element: ElementTree.Element, path: str, flat: _Flat) -> None:
         tag = child.tag.rpartition("}")[2]
         if tag == "LinearTransformation":
             factor, offset = (
-                validation.number(f"{label}, {key}", _number(child, key, normal)) for key, normal in (("factor", 1.0), ("offset", 0.0))
+                checks.number(f"{label}, {key}", _number(child, key, normal)) for key, normal in (("factor", 1.0), ("offset", 0.0))
             )
         elif tag not in ("ConnectionGeometry", "Annotations"):
             raise BadInput(label, Text(tag), "LinearTransformation, or none")
@@ -265,7 +265,7 @@ def _value(parameter: ElementTree.Element, place: str) -> tuple[Any, str | None]
     kind = "nothing" if typed is None else typed.tag.rpartition("}")[2]
     text = "" if typed is None else typed.get("value", "")
     if kind == "Real" and typed is not None:
-        return validation.number(place, _number(typed, "value", None)), typed.get("unit")
+        return checks.number(place, _number(typed, "value", None)), typed.get("unit")
     if kind == "Integer":
         with contextlib.suppress(ValueError):
             return int(text), None

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text
 from ..fmu.description import BASE_UNITS
 from ..fmu.isolated_slave import IsolatedSlave
@@ -54,9 +54,9 @@ def export_ssp(
     BadInput
         For partners that are no arm and no FMU, and connected arrays: SSP 1.0 has none.
     """
-    target = validation.path("path", path)
+    target = checks.path("path", path)
     files.may_replace(target, ".ssp")
-    if not validation.flag("replace", replace):
+    if not checks.flag("replace", replace):
         files.may_replace_archive(target, ".ssp", ROOT, ANNOTATION)
     with tempfile.TemporaryDirectory(prefix="armrs-ssp-") as place:
         content = {}

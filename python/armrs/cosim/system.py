@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from ..fmu.isolated_slave import IsolatedSlave
 from ..fmu.slave_interface import Partner, Variable
@@ -190,10 +190,10 @@ def couple(
         if connection.target in seen:
             raise BadInput("[[connection]]", Text(f"two connections to {'.'.join(connection.target)}"), "one for each input")
         seen.add(connection.target)
-    step = validation.number("[system], step_s", step, above=0.0, unit="s")
-    duration = validation.number("[system], duration_s", duration, least=step, unit="s", hint="at least one step")
+    step = checks.number("[system], step_s", step, above=0.0, unit="s")
+    duration = checks.number("[system], duration_s", duration, least=step, unit="s", hint="at least one step")
     if shortest_step is not None:
-        shortest_step = validation.number("[system], shortest_step_s", shortest_step, above=0.0, most=step, unit="s")
+        shortest_step = checks.number("[system], shortest_step_s", shortest_step, above=0.0, most=step, unit="s")
         for fixed in (slave.name for slave in named.values() if not slave.can_vary_step):
             raise BadInput("[system], shortest_step_s", shortest_step, f"none, for {fixed} cannot vary its step")
     shortest = shortest_step or step
@@ -208,13 +208,13 @@ def couple(
         slaves=named,
         connections=tuple(joined),
         starts={name: dict(values) for name, values in (starts or {}).items()},
-        algorithm=validation.choice("[system], algorithm", algorithm, ALGORITHMS),
+        algorithm=checks.choice("[system], algorithm", algorithm, ALGORITHMS),
         step=step,
         duration=duration,
-        tolerance=validation.number("[system], tolerance", tolerance, above=0.0, most=0.1),
-        accuracy=validation.number("[system], accuracy", accuracy, above=0.0, most=1.0),
-        refine=validation.whole("[system], refine", refine, least=0, most=10),
-        resolution=validation.number("[system], resolution_s", resolution, least=1e-6, unit="s"),
+        tolerance=checks.number("[system], tolerance", tolerance, above=0.0, most=0.1),
+        accuracy=checks.number("[system], accuracy", accuracy, above=0.0, most=1.0),
+        refine=checks.whole("[system], refine", refine, least=0, most=10),
+        resolution=checks.number("[system], resolution_s", resolution, least=1e-6, unit="s"),
         shortest_step=shortest_step,
         warnings=tuple(warnings),
     )
@@ -234,18 +234,18 @@ def load_system(path: str | os.PathLike[str]) -> System:
 def _system(document: dict[str, Any], path: Path) -> System:
     made: list[Partner] = []
     try:
-        validation.keys("", document, required=["system", "slave"], optional=["connection"])
-        settings = validation.table("[system]", document["system"])
-        validation.keys("[system]", settings, required=["step_s", "duration_s"], optional=_OPTIONAL)
+        checks.keys("", document, required=["system", "slave"], optional=["connection"])
+        settings = checks.table("[system]", document["system"])
+        checks.keys("[system]", settings, required=["step_s", "duration_s"], optional=_OPTIONAL)
         starts = {}
-        for number, table in enumerate(validation.tables("slave", document["slave"]), start=1):
+        for number, table in enumerate(checks.tables("slave", document["slave"]), start=1):
             try:
                 made.append(_slave(table, path.parent))
             except BadInput as error:
                 raise error if error.file else error.within(place=f"[[slave]] {number}") from None
-            starts[made[-1].name] = validation.table("start", table.get("start", {}))
+            starts[made[-1].name] = checks.table("start", table.get("start", {}))
         settings = {key.removesuffix("_s"): value for key, value in settings.items()}
-        return couple(made, validation.tables("connection", document.get("connection", [])), starts=starts, **settings)
+        return couple(made, checks.tables("connection", document.get("connection", [])), starts=starts, **settings)
     except BaseException:
         for slave in made:
             slave.free()
@@ -285,12 +285,12 @@ def _check_value(place: str, variable: Variable, value: object) -> None:
         if not isinstance(value, str):
             raise BadInput(place, value, "a text")
     elif kind == "Boolean":
-        validation.flag(place, value)
+        checks.flag(place, value)
     elif kind.startswith(("Int", "UInt")):
         least, most = whole_range(kind)
-        validation.whole(place, value, least=least, most=most)
+        checks.whole(place, value, least=least, most=most)
     else:
-        validation.number(place, value)
+        checks.number(place, value)
 
 
 def _slave(table: dict[str, Any], folder: Path) -> Partner:
@@ -299,41 +299,39 @@ def _slave(table: dict[str, Any], folder: Path) -> Partner:
         raise BadInput(", ".join(KINDS), Text(" and ".join(kinds) or "none of them"), "one of them")
     kind = kinds[0]
     if kind in ("signal", "pid", "impedance"):
-        validation.keys("", table, required=[kind, "name"], optional=["start"])
+        checks.keys("", table, required=[kind, "name"], optional=["start"])
         try:
-            return from_table(kind, validation.table(kind, table[kind]), validation.text("name", table["name"]), folder)
+            return from_table(kind, checks.table(kind, table[kind]), checks.text("name", table["name"]), folder)
         except BadInput as error:
             raise error if error.file else error.within(place=kind) from None
     if kind == "wall":
-        validation.keys("", table, required=["wall", "name"], optional=["start"])
-        wall = validation.table("wall", table["wall"])
-        validation.keys("wall", wall, required=["axis", "position_m", "stiffness"], optional=["damping"])
-        return Wall(
-            wall["axis"], wall["position_m"], wall["stiffness"], wall.get("damping", 0.0), name=validation.text("name", table["name"])
-        )
-    path = folder / validation.text(kind, table[kind])
+        checks.keys("", table, required=["wall", "name"], optional=["start"])
+        wall = checks.table("wall", table["wall"])
+        checks.keys("wall", wall, required=["axis", "position_m", "stiffness"], optional=["damping"])
+        return Wall(wall["axis"], wall["position_m"], wall["stiffness"], wall.get("damping", 0.0), name=checks.text("name", table["name"]))
+    path = folder / checks.text(kind, table[kind])
     if kind == "fmu":
-        validation.keys("", table, required=["fmu"], optional=["name", "start", "seconds"])
+        checks.keys("", table, required=["fmu"], optional=["name", "start", "seconds"])
         settings: dict[str, Any] = (
-            {"seconds": validation.number("seconds", table["seconds"], above=0.0, unit="s")} if "seconds" in table else {}
+            {"seconds": checks.number("seconds", table["seconds"], above=0.0, unit="s")} if "seconds" in table else {}
         )
-        return IsolatedSlave(path, name=validation.text("name", table["name"]) if "name" in table else None, **settings)
+        return IsolatedSlave(path, name=checks.text("name", table["name"]) if "name" in table else None, **settings)
     optional = ["name", "port", "start", "start_deg", "rest", "inner_step_s", "handle_m"]
-    validation.keys("", table, required=["model"], optional=optional)
+    checks.keys("", table, required=["model"], optional=optional)
     if "handle_m" in table and table.get("port", "force") == "force":
         raise BadInput("handle_m", table["handle_m"], 'none with port = "force": the handle belongs to the motion port')
     degrees = table.get("start_deg")
     if degrees is not None:
         if not isinstance(degrees, list):
             raise BadInput("start_deg", degrees, "a list of numbers, one a joint")
-        degrees = [np.radians(validation.number(f"start_deg[{k}]", item)) for k, item in enumerate(degrees)]
+        degrees = [np.radians(checks.number(f"start_deg[{k}]", item)) for k, item in enumerate(degrees)]
     settings = {"step": table["inner_step_s"]} if "inner_step_s" in table else {}
     try:
         return Slave(
             path,
             port=table.get("port", "force"),
             start=degrees,
-            rest=validation.flag("rest", table.get("rest", False)),
+            rest=checks.flag("rest", table.get("rest", False)),
             handle=table.get("handle_m"),
             name=table.get("name"),
             **settings,
@@ -343,7 +341,7 @@ def _slave(table: dict[str, Any], folder: Path) -> Partner:
 
 
 def _connections(table: dict[str, Any], slaves: dict[str, Partner], warnings: list[str]) -> list[Connection]:
-    validation.keys("", table, required=["from", "to"], optional=["within", "dual", "factor", "offset"])
+    checks.keys("", table, required=["from", "to"], optional=["within", "dual", "factor", "offset"])
     sources = _ends("from", table["from"], slaves)
     targets = _ends("to", table["to"], slaves)
     if len(sources) != len(targets):
@@ -377,14 +375,14 @@ def _connection(
     ):
         raise BadInput("from, to", Text(f"{label}, in {output.unit} and {given.unit}"), "the same dimension at both ends")
     dual, sign = _dual(table.get("dual"), target, slaves)
-    factor, offset = validation.number("factor", table.get("factor", 1.0)), validation.number("offset", table.get("offset", 0.0))
+    factor, offset = checks.number("factor", table.get("factor", 1.0)), checks.number("offset", table.get("offset", 0.0))
     within = table.get("within")
     if family(given) != "Float":
         if (factor, offset) != (1.0, 0.0):
             raise BadInput("factor, offset", Text(f"with {output.type}"), "neither, except between floating point numbers")
         # Between whole numbers there is nothing to hold.
-        return Connection(source, target, validation.choice("within", "start" if within is None else within, ("start", "end")))
-    within = _within(target, given, slaves) if within is None else validation.choice("within", within, WITHIN)
+        return Connection(source, target, checks.choice("within", "start" if within is None else within, ("start", "end")))
+    within = _within(target, given, slaves) if within is None else checks.choice("within", within, WITHIN)
     return Connection(source, target, within, dual, sign, factor * output.scale / given.scale, offset)
 
 
@@ -404,7 +402,7 @@ def parted(text: str, slaves: Iterable[str]) -> tuple[str, str]:
 
 def _ends(key: str, value: object, slaves: dict[str, Partner]) -> list[tuple[str, str]]:
     """Return the variables of a name: itself, or all of its indices."""
-    text = validation.text(key, value)
+    text = checks.text(key, value)
     name, variable = parted(text, slaves)
     if name not in slaves:
         raise unknown_name(key, name, slaves, what="slave")
@@ -437,7 +435,7 @@ def _dual(given: object, target: tuple[str, str], slaves: dict[str, Partner]) ->
             own = f"{dual}{match[1]}", sign
     if given is None or given == own[0]:
         return own
-    name = validation.text("dual", given)
+    name = checks.text("dual", given)
     if name not in known:
         raise unknown_name("dual", name, known, what=f"variable of {target[0]}")
     one, other = slaves[target[0]].variable(target[1]).exponents, known[name].exponents

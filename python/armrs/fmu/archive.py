@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text
 
 DESCRIPTION = "modelDescription.xml"
@@ -35,7 +35,7 @@ def archive(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
         For what is no regular file or no zip archive.
     """
     try:
-        source = validation.path("path", path)
+        source = checks.path("path", path)
         if source.exists() and not source.is_file():
             raise BadInput("file", Text("not a regular file"), "an FMU, which is a zip archive", file=path)
         files = zipfile.ZipFile(source)

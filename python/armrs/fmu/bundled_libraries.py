@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import ArmrsError, BadInput, Text
 from .shared_library import platform_folder
 
@@ -91,7 +91,7 @@ def collected(fmi: int, folder: str | os.PathLike[str] | None) -> tuple[dict[tup
         For a folder without libraries, or a file that is none of this version for the machine that its folder names; for that of the
         package too, which a wheel that was made on another machine may have got wrong.
     """
-    given = {} if folder is None else _read(validation.path("library", folder))
+    given = {} if folder is None else _read(checks.path("library", folder))
     licence = None if folder is None else Path(folder) / LICENCE
     here = platform_folder(3)[0]
     if here not in given:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from .archive import unpack
 from .description import Description, read_description
@@ -109,7 +109,7 @@ class ImportedSlave(Partner):
         description: Description | None = None,
         **mode: Any,
     ) -> None:
-        self.path = validation.path("path", path)
+        self.path = checks.path("path", path)
         self.description = read_description(path) if description is None else description
         interface = "ScheduledExecution" if "scheduled" in mode else "CoSimulation"
         describe(self, self.path, self.description, name, interface)
@@ -364,7 +364,7 @@ def describe(slave: Any, path: Path, description: Description, name: str | None,
     """Give a slave the attributes of a `Partner` from the description of its FMU."""
     if interface not in description.interfaces:
         raise BadInput("modelDescription.xml", Text(f"{' and '.join(description.interfaces)} only"), "an FMU for co-simulation", file=path)
-    slave.name = path.stem if name is None else validation.text("name", name)
+    slave.name = path.stem if name is None else checks.text("name", name)
     slave.variables = {v.name: v for v in description.variables}
     slave.can_rollback = description.flag(f"canGetAndSetFMU{'S' if description.fmi == 3 else 's'}tate")
     slave.can_vary_step = description.flag("canHandleVariableCommunicationStepSize")

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
 from .archive import unpack
 from .confined_process import Confined, ProcessEnded
@@ -50,7 +50,7 @@ class IsolatedSlave(Partner):
     """
 
     def __init__(self, path: str | os.PathLike[str], *, name: str | None = None, logging: bool = False, seconds: float = _SECONDS) -> None:
-        self.path = validation.path("path", path)
+        self.path = checks.path("path", path)
         self.description = read_description(path)
         describe(self, self.path, self.description, name)
         # Inputs travel with the next call, and what was read after the last step comes with the next step: one way there and back a step.
@@ -58,7 +58,7 @@ class IsolatedSlave(Partner):
         self._pending: list[tuple[Any, Any]] = []
         self._wanted: dict[tuple[str, ...], None] = {}
         self._fresh: dict[tuple[str, ...], list[float]] = {}
-        self._seconds = validation.number("seconds", seconds, above=0.0, unit="s")
+        self._seconds = checks.number("seconds", seconds, above=0.0, unit="s")
         folder = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
         process = None
         try:

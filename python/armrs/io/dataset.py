@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..anthropometry import literature_model
 from ..errors import NO_FILE, ArmrsError, BadInput, BadInputs, Text, nearest
 from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, TrialEntry, load_model
@@ -84,26 +84,26 @@ class Dataset(Framed, Series):
     muscles: tuple[Muscle, ...] = ()
 
     def __post_init__(self) -> None:
-        validation.instance("model", self.model, Model)
-        trials = validation.instances("trials", self.trials, Trial)
+        checks.instance("model", self.model, Model)
+        trials = checks.instances("trials", self.trials, Trial)
         for trial in trials:
             if trial.q.shape[1] != self.model.n_joints:
                 raise BadInput("angles", Text(f"{trial.q.shape[1]} joints"), f"{self.model.n_joints}, as the model has", file=trial.file)
         if self.force_on is not None:
-            validation.choice("force_on", self.force_on, ("robot", "arm"))
+            checks.choice("force_on", self.force_on, ("robot", "arm"))
         if self.sample_rate is not None:
-            validation.number("sample_rate", self.sample_rate, above=0.0, unit="Hz")
-        validation.instance("subject", self.subject, Subject)
-        validation.instance("tolerance", self.tolerance, Tolerance)
+            checks.number("sample_rate", self.sample_rate, above=0.0, unit="Hz")
+        checks.instance("subject", self.subject, Subject)
+        checks.instance("tolerance", self.tolerance, Tolerance)
         for name in ("folder", "model_path"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, validation.path(name, getattr(self, name)))
-        object.__setattr__(self, "name", validation.text("name", self.name))
+                object.__setattr__(self, name, checks.path(name, getattr(self, name)))
+        object.__setattr__(self, "name", checks.text("name", self.name))
         object.__setattr__(self, "trials", trials)
-        object.__setattr__(self, "warnings", validation.instances("warnings", self.warnings, str))
-        object.__setattr__(self, "synthetic", validation.flag("synthetic", self.synthetic))
-        object.__setattr__(self, "added", validation.instances("added", self.added, AddedMass))
-        object.__setattr__(self, "muscles", validation.instances("muscles", self.muscles, Muscle))
+        object.__setattr__(self, "warnings", checks.instances("warnings", self.warnings, str))
+        object.__setattr__(self, "synthetic", checks.flag("synthetic", self.synthetic))
+        object.__setattr__(self, "added", checks.instances("added", self.added, AddedMass))
+        object.__setattr__(self, "muscles", checks.instances("muscles", self.muscles, Muscle))
 
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
@@ -323,7 +323,7 @@ def name_of(path: Path, description: Description) -> str:
 def _on(model: Model, item: AddedMass, place: str, file: Path) -> None:
     """Refuse a mass that is on no segment of a model."""
     try:
-        validation.whole("segment", item.segment, least=1, most=model.n_joints)
+        checks.whole("segment", item.segment, least=1, most=model.n_joints)
         model.with_mass(item.segment, item.mass, item.at)
     except BadInput as error:
         raise error.within(place=place, file=file) from None
@@ -343,7 +343,7 @@ def naming_trials(trials: Sequence[Trial]) -> Iterator[None]:
 
 def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     """Return the path of a `dataset.toml` and its contents."""
-    path = validation.path("source", source)
+    path = checks.path("source", source)
     if not os.path.lexists(path):
         raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)
     trial = path.suffix.lower() in SUFFIXES and path.is_file()
@@ -392,10 +392,10 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
     >>> armrs.write_dataset(armrs.load_dataset("session"), "copy", suffix=".parquet").name
     'dataset.toml'
     """
-    validation.instance("dataset", dataset, Dataset)
+    checks.instance("dataset", dataset, Dataset)
     out = files.output_folder(folder)
     if suffix is not None:
-        validation.choice("suffix", suffix, SUFFIXES)
+        checks.choice("suffix", suffix, SUFFIXES)
     if dataset.force_on is None and any(trial.force_on_arm is not None for trial in dataset.trials):
         dataset = dataset.replace(force_on="arm")
     names = output_names([trial.file for trial in dataset.trials], suffix)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from . import c3d
 from .trial import MOVED
@@ -54,11 +54,11 @@ class Markers:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        names, n = list(validation.instances("names", self.names, str)), None
-        t = validation.samples("t", self.t, "s", shape=(n,))
+        names, n = list(checks.instances("names", self.names, str)), None
+        t = checks.samples("t", self.t, "s", shape=(n,))
         shape = (len(t), len(names), 3)
-        positions = validation.samples("positions", self.positions, "m", shape=shape)
-        for name, value in (("names", names), ("t", t), ("positions", positions), ("up", validation.text("up", self.up))):
+        positions = checks.samples("positions", self.positions, "m", shape=shape)
+        for name, value in (("names", names), ("t", t), ("positions", positions), ("up", checks.text("up", self.up))):
             object.__setattr__(self, name, value)
 
     def point(self, text: str) -> np.ndarray:
@@ -242,8 +242,8 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
     The plane is spanned by the directions of all segments at all times, whatever the base does: its normal is the direction in which
     they reach least (singular value decomposition). Lengths and flexion are taken in space, angles from shadows in the plane.
     """
-    validation.instance("markers", markers, Markers)
-    points = validation.instances("points", points, str)
+    checks.instance("markers", markers, Markers)
+    points = checks.instances("points", points, str)
     if len(points) < 2:
         raise BadInput("points", Text(f"{len(points)} points"), "two or more, from the first joint to the handle")
     at = np.stack([markers.point(text) for text in points], axis=1)
@@ -294,7 +294,7 @@ def planar_motion(markers: Markers, points: Sequence[str], *, up: str | None = N
 
 
 def _axis(text: str, place: str) -> np.ndarray:
-    name = validation.text(place, text).lower().lstrip("+-")
+    name = checks.text(place, text).lower().lstrip("+-")
     if name not in _AXES or len(text) - len(name) > 1:
         raise BadInput(place, text, "x, y, z, -x, -y or -z")
     result = np.zeros(3)

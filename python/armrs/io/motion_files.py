@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from . import files
 from .columns import ANGLE
@@ -38,7 +38,7 @@ def read_markers(path: str | os.PathLike[str]) -> Markers:
     BadInput
         Names the file, the place, the value found and the value allowed.
     """
-    file = validation.path("file", path)
+    file = checks.path("file", path)
     suffix = file.suffix.lower()
     if suffix not in MARKER_SUFFIXES:
         raise BadInput("file", Text(f"suffix {file.suffix!r}"), " or ".join(MARKER_SUFFIXES), file=file)
@@ -79,8 +79,8 @@ def convert_markers(
     BadInput
         For a file that cannot be read, and points that it does not have.
     """
-    path = validation.path("source", source)
-    target = files.output_folder(folder) / path.with_suffix(f".{validation.choice('to', to, _FORMATS)}").name
+    path = checks.path("source", source)
+    target = files.output_folder(folder) / path.with_suffix(f".{checks.choice('to', to, _FORMATS)}").name
     markers = read_markers(path)
     try:
         motion = planar_motion(markers, points, up=up, forward=forward)
@@ -114,9 +114,9 @@ def convert_motion(source: str | os.PathLike[str], folder: str | os.PathLike[str
     BadInput
         For a file that cannot be read, and coordinates that it does not have.
     """
-    path = validation.path("source", source)
-    target = files.output_folder(folder) / path.with_suffix(f".{validation.choice('to', to, _FORMATS)}").name
-    coordinates = validation.instances("coordinates", coordinates, str)
+    path = checks.path("source", source)
+    target = files.output_folder(folder) / path.with_suffix(f".{checks.choice('to', to, _FORMATS)}").name
+    coordinates = checks.instances("coordinates", coordinates, str)
     files.not_an_input([target], [path])
     if path.suffix.lower() in MOTION_SUFFIXES:
         motion = _named(path, read_motion)

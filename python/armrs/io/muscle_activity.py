@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text
 from ..model import Muscle
 from .trial import Trial
@@ -122,7 +122,7 @@ def joint_activity(trials: Sequence[Trial], muscles: Sequence[Muscle], n_joints:
         return tuple(trials), []
     sums, counts, lines = [np.zeros((len(trial), n_joints)) for trial in trials], np.zeros(n_joints), []
     for number, muscle in enumerate(muscles, start=1):
-        joint = validation.whole(f"[[muscle]] {number}, joint", muscle.joint, least=1, most=n_joints) - 1
+        joint = checks.whole(f"[[muscle]] {number}, joint", muscle.joint, least=1, most=n_joints) - 1
         counts[joint] += 1
         for trial in trials:
             if muscle.channel not in trial.emg:

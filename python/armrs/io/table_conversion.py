@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Sentence, Text
 from . import files
 from .dataset import FILE, describe, described_model, name_of, output_names
@@ -60,8 +60,8 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     >>> armrs.convert("session", "parquet", to="parquet")[0].name
     'slow_1.parquet'
     """
-    suffix = "." + validation.choice("to", to, tuple(s[1:] for s in SUFFIXES))
-    path = validation.path("source", source)
+    suffix = "." + checks.choice("to", to, tuple(s[1:] for s in SUFFIXES))
+    path = checks.path("source", source)
     out = files.output_folder(folder)
     if path.suffix.lower() in SUFFIXES and not path.is_dir():
         target = out / path.with_suffix(suffix).name

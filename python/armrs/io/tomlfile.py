@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text, not_utf8
 
 if sys.version_info >= (3, 11):
@@ -68,7 +68,7 @@ def load(path: str | os.PathLike[str], make: Callable[[dict[str, Any], Path], _M
 
 def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> str:
     """Return the text of a UTF-8 file of at most `most` bytes, or raise `BadInput`."""
-    file = validation.path("file", path)
+    file = checks.path("file", path)
     try:
         is_folder, is_file, size = file.is_dir(), file.is_file(), file.stat().st_size
         raw = file.read_bytes() if is_file and size <= most else b""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import validation, view_registry
+from .. import checks, view_registry
 from ..errors import BadInput, BadInputs, Text, not_later
 from . import columns, resample
 from .samples import Samples, read_samples
@@ -110,20 +110,20 @@ class Trial:
 
     def __post_init__(self) -> None:
         for name in ("file", "configuration"):
-            validation.instance(name, getattr(self, name), str)
-        validation.whole("repeat", self.repeat, least=1)
-        validation.choice("role", self.role, ("fit", "test"))
-        n = len(validation.numbers("t", self.t, "s", shape=(None,)))
+            checks.instance(name, getattr(self, name), str)
+        checks.whole("repeat", self.repeat, least=1)
+        checks.choice("role", self.role, ("fit", "test"))
+        n = len(checks.numbers("t", self.t, "s", shape=(None,)))
         if n < 2:
             raise BadInput("t", Text(f"{n} samples"), "two or more")
-        joints = validation.samples("q", self.q, "rad", shape=(n, None)).shape[1]
+        joints = checks.samples("q", self.q, "rad", shape=(n, None)).shape[1]
         shapes: dict[str, tuple[int, ...]] = {
             "force_on_arm": (n, 2), "moment_on_arm": (n,), "robot_q": (n, 2), "tau": (n, joints), "dq": (n, joints),
             "base": (n, 2), "activity": (n, joints),
         }  # fmt: skip
         for name, shape in {"t": (n,), "q": (n, joints), **shapes}.items():
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, validation.samples(name, getattr(self, name), shape=shape))
+                object.__setattr__(self, name, checks.samples(name, getattr(self, name), shape=shape))
         if self.valid.size == 0:
             measured = [a for a in (self.q, self.force_on_arm, self.moment_on_arm, self.robot_q, self.tau, self.base) if a is not None]
             rows = [np.isfinite(a).reshape(len(a), -1).all(axis=1) for a in measured]

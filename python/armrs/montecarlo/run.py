@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import validation
+from .. import checks
 from ..io import files
 from ..io.samples import parquet_table
 from ..tabular import Tabular, Tidy
@@ -103,8 +103,8 @@ def sweep(
     ArmrsError
         When workers were lost; what is done stays, and the same call goes on.
     """
-    jobs = validation.whole("jobs", jobs, least=1, most=MOST_JOBS)
-    spec = validation.loaded("sweep", source, Sweep, load_sweep)
+    jobs = checks.whole("jobs", jobs, least=1, most=MOST_JOBS)
+    spec = checks.loaded("sweep", source, Sweep, load_sweep)
     out = files.output_folder(folder)
     files.must_be_writable(out)
     store = Store(spec, out)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io import tomlfile
 from ..io.dataset import Dataset, load_dataset
@@ -137,11 +137,11 @@ def load_sweep(path: str | os.PathLike[str]) -> Sweep:
 
 
 def _sweep(table: dict[str, Any], path: Path) -> Sweep:
-    validation.keys("", table, required=["cases"], optional=["name", "seed", "experiment", "dataset", "vary", "identify"])
-    cases = validation.whole("cases", table["cases"], least=1, most=MOST_CASES)
-    seed = validation.whole("seed", table.get("seed", 1), least=0, most=2**53)
-    name = validation.text("name", table.get("name", path.stem))
-    vary = tuple(vary_of(f"[[vary]] {k}", t) for k, t in enumerate(validation.tables("vary", table.get("vary", [])), 1))
+    checks.keys("", table, required=["cases"], optional=["name", "seed", "experiment", "dataset", "vary", "identify"])
+    cases = checks.whole("cases", table["cases"], least=1, most=MOST_CASES)
+    seed = checks.whole("seed", table.get("seed", 1), least=0, most=2**53)
+    name = checks.text("name", table.get("name", path.stem))
+    vary = tuple(vary_of(f"[[vary]] {k}", t) for k, t in enumerate(checks.tables("vary", table.get("vary", [])), 1))
     for k, item in enumerate(vary):
         if item.key in [other.key for other in vary[:k]]:
             raise BadInput(f"[[vary]] {k + 1}, key", item.key, "each key once")
@@ -150,7 +150,7 @@ def _sweep(table: dict[str, Any], path: Path) -> Sweep:
     question = _question(table["identify"]) if "identify" in table else None
     if "dataset" in table:
         return _resampled(table, path, Sweep(name, seed, cases, {}, path, None, vary, question, ""))
-    source = path.parent / validation.text("experiment", table["experiment"])
+    source = path.parent / checks.text("experiment", table["experiment"])
     document = _experiment_document(source)
     draft = Sweep(name, seed, cases, document, source, None, vary, question, _digest(table, document))
     _check_draws(draft)
@@ -198,7 +198,7 @@ def _resampled(table: dict[str, Any], path: Path, draft: Sweep) -> Sweep:
         raise BadInput("[identify]", Text("nothing"), "a table [identify]: resamples of a data set are identified")
     if draft.question.bootstrap:
         raise BadInput("[identify], bootstrap", draft.question.bootstrap, "0 beside dataset: every case is a resample")
-    dataset = load_dataset(path.parent / validation.text("dataset", table["dataset"]))
+    dataset = load_dataset(path.parent / checks.text("dataset", table["dataset"]))
     if sum(t.role == "fit" for t in dataset.trials) < 2:
         raise BadInput("dataset", Text("one trial to fit"), "at least two, to draw from")
     _check_question(draft.question, dataset.model)
@@ -207,20 +207,20 @@ def _resampled(table: dict[str, Any], path: Path, draft: Sweep) -> Sweep:
 
 def _question(table: object) -> Question:
     place = "[identify]"
-    given = validation.table(place, table)
-    validation.keys(place, given, optional=["method", "with", "cutoff_Hz", "motion", "level", "bootstrap"])
+    given = checks.table(place, table)
+    checks.keys(place, given, optional=["method", "with", "cutoff_Hz", "motion", "level", "bootstrap"])
     kinds = given.get("with")
     if kinds is not None and not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
         raise BadInput(f"{place}, with", kinds, 'a list of kinds of effects, as in ["coulomb"]')
-    level = validation.number(f"{place}, level", given.get("level", 0.95), **LEVELS)
+    level = checks.number(f"{place}, level", given.get("level", 0.95), **LEVELS)
     cutoff = given.get("cutoff_Hz")
     return Question(
-        method=validation.choice(f"{place}, method", given.get("method", "joint"), ("joint", "cascade")),
+        method=checks.choice(f"{place}, method", given.get("method", "joint"), ("joint", "cascade")),
         with_effects=None if kinds is None else tuple(kinds),
-        cutoff=None if cutoff is None else validation.number(f"{place}, cutoff_Hz", cutoff, above=0.0, unit="Hz"),
-        motion=validation.choice(f"{place}, motion", given.get("motion", "auto"), ("auto", "measured", "simulated")),
+        cutoff=None if cutoff is None else checks.number(f"{place}, cutoff_Hz", cutoff, above=0.0, unit="Hz"),
+        motion=checks.choice(f"{place}, motion", given.get("motion", "auto"), ("auto", "measured", "simulated")),
         level=level,
-        bootstrap=validation.whole(f"{place}, bootstrap", given.get("bootstrap", 0), least=0, most=MOST_RESAMPLES),
+        bootstrap=checks.whole(f"{place}, bootstrap", given.get("bootstrap", 0), least=0, most=MOST_RESAMPLES),
     )
 
 

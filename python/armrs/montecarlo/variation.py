@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from ..model import Contact, Effect, Joint, Model, Segment
 
@@ -87,7 +87,7 @@ class Vary:
                 return value
             if old is None:
                 raise BadInput("apply", self.apply, f"a value of {self.key} in the experiment to {self.apply}")
-            number = validation.number(f"{self.key} before the draw", old)
+            number = checks.number(f"{self.key} before the draw", old)
             return number * value if self.apply == "scale" else number + value
 
         return _changed(target, path_of(self.key), new, self.key)
@@ -95,8 +95,8 @@ class Vary:
 
 def vary_of(place: str, table: Mapping[str, Any]) -> Vary:
     """Return the contents of a table `[[vary]]`."""
-    validation.keys(place, table, required=["key"], optional=[*DISTRIBUTIONS, "within", "apply"])
-    key = validation.text(f"{place}, key", table["key"])
+    checks.keys(place, table, required=["key"], optional=[*DISTRIBUTIONS, "within", "apply"])
+    key = checks.text(f"{place}, key", table["key"])
     place = f"{place} ({key})"
     try:
         path_of(key)
@@ -108,14 +108,14 @@ def vary_of(place: str, table: Mapping[str, Any]) -> Vary:
         if kind == "values":
             numbers = _values(table[kind])
         else:
-            numbers = validation.pair(kind, table[kind])
+            numbers = checks.pair(kind, table[kind])
             if kind == "range" and not numbers[0] < numbers[1]:
                 raise BadInput(kind, list(numbers), "low and high, low first")
             if kind == "normal":
-                validation.number("normal[1]", numbers[1], above=0.0)
+                checks.number("normal[1]", numbers[1], above=0.0)
         if "within" in table:
             within = _within(table["within"], kind, numbers)
-        apply = validation.choice("apply", table.get("apply", "replace"), APPLY)
+        apply = checks.choice("apply", table.get("apply", "replace"), APPLY)
         vary = Vary(key, kind, numbers, within, apply)
         if apply != "replace" and not vary.numeric:
             raise BadInput("values", table["values"], f'numbers, with apply = "{apply}"')
@@ -144,14 +144,14 @@ def _values(value: object) -> tuple[Any, ...]:
         raise BadInput("values", value, "a list of at least one value")
     for k, item in enumerate(value, start=1):
         if isinstance(item, float):
-            validation.number(f"values, {k}", item)
+            checks.number(f"values, {k}", item)
     return tuple(value)
 
 
 def _within(value: object, kind: str, numbers: tuple[float, ...]) -> tuple[float, float]:
     if kind != "normal":
         raise BadInput("within", value, "only beside normal")
-    low, high = validation.pair("within", value)
+    low, high = checks.pair("within", value)
     if not low < high:
         raise BadInput("within", [low, high], "low and high, low first")
     from scipy.stats import norm

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..model import Model, load_model
 from ..workflows.firmware import covariance_of, unknowns_of
@@ -96,10 +96,10 @@ class _Carries:
             Speeds [rad/s]; at rest when absent.
         """
         joints = self.model.n_joints
-        angles = validation.samples("q", q, "rad")
+        angles = checks.samples("q", q, "rad")
         if angles.ndim not in (1, 2) or angles.shape[-1] != joints:
             raise BadInput("q", Text(f"an array of shape {angles.shape}"), f"({joints},) or (n, {joints})")
-        speeds = np.zeros(angles.shape) if qd is None else validation.samples("qd", qd, "rad/s", shape=angles.shape)
+        speeds = np.zeros(angles.shape) if qd is None else checks.samples("qd", qd, "rad/s", shape=angles.shape)
         rows = [np.ascontiguousarray(np.atleast_2d(a)) for a in (angles, speeds)]
         torque, sd = self._inner.carry(np.zeros(len(rows[0])), *rows)
         return Carried(torque.reshape(angles.shape), sd.reshape(angles.shape))
@@ -128,13 +128,13 @@ class Estimator(_Carries):
     _inner: _armrs.OnlineEstimator
 
     def __init__(self, model: Model | str | os.PathLike[str], settings: Settings | float) -> None:
-        self.model = validation.loaded("model", model, Model, load_model)
+        self.model = checks.loaded("model", model, Model, load_model)
         if not self.model.segment_uncertainty > 0.0:
             raise BadInput(
                 "segment_uncertainty", self.model.segment_uncertainty, "above 0: an arm that is known exactly leaves nothing to learn"
             )
         if not isinstance(settings, Settings):
-            settings = default_settings(self.model, validation.number("settings", settings, above=0.0, unit="s"))
+            settings = default_settings(self.model, checks.number("settings", settings, above=0.0, unit="s"))
         self.settings = settings
         self._inner = _armrs.OnlineEstimator(_armrs.Rig(self.model), self.model.segment_uncertainty, dict(vars(settings)))
 
@@ -165,11 +165,11 @@ class Estimator(_Carries):
             Torques of motors [N m]; angles from which speeds are taken [rad].
         """
         shape = (self.model.n_joints,)
-        row = partial(validation.samples, shape=shape)
+        row = partial(checks.samples, shape=shape)
         angles = np.full(shape, np.nan) if q is None else row("q", q, "rad")
         torque = np.zeros(shape) if tau is None else row("tau", tau, "N m")
-        force = validation.samples("force_on_arm", force_on_arm, "N", shape=(2,))
-        moment = validation.samples("moment_on_arm", moment_on_arm, "N m", shape=())
+        force = checks.samples("force_on_arm", force_on_arm, "N", shape=(2,))
+        moment = checks.samples("moment_on_arm", moment_on_arm, "N m", shape=())
         hand = np.array([[*force, float(moment)]])
         ahead = None if lead is None else np.atleast_2d(row("lead", lead, "rad")).copy()
         told = self.run(np.zeros(1), np.atleast_2d(angles).copy(), np.atleast_2d(torque).copy(), hand, ahead, np.array([q is None]), 2)
@@ -224,8 +224,8 @@ class Compensation(_Carries):
         *,
         precision: str = "double",
     ) -> None:
-        validation.choice("precision", precision, PRECISIONS)
-        self.model = validation.loaded("model", model, Model, load_model)
+        checks.choice("precision", precision, PRECISIONS)
+        self.model = checks.loaded("model", model, Model, load_model)
         covariance = covariance_of(self.model, identified).tolist()
         self._inner = _armrs.OnlineCompensation(_armrs.Rig(self.model), covariance, precision)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import BadInput, Text, not_later
 from ..io import columns
 from ..io.resample import usual_step
@@ -56,7 +56,7 @@ class Log:
     lead: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        t = validation.numbers("t", self.t, "s", shape=(None,))
+        t = checks.numbers("t", self.t, "s", shape=(None,))
         n = len(t)
         if n < 2:
             raise BadInput("t", Text(f"{n} samples"), "two or more")
@@ -64,13 +64,13 @@ class Log:
         if back.size:
             k = int(back[0]) + 1
             raise not_later(f"t[{k}]", t[k - 1], t[k])
-        joints = validation.samples("q", self.q, "rad", shape=(n, None)).shape[1]
+        joints = checks.samples("q", self.q, "rad", shape=(n, None)).shape[1]
         if self.force_on_arm is None and self.tau is None:
             raise BadInput("force_on_arm", Text("neither forces nor torques"), "force_on_arm, or tau, or both")
         shapes = {"t": (n,), "q": (n, joints), "force_on_arm": (n, 2), "moment_on_arm": (n,), "tau": (n, joints), "lead": (n, joints)}
         for name, shape in shapes.items():
             if getattr(self, name) is not None:
-                array = validation.samples(name, getattr(self, name), shape=shape).copy()
+                array = checks.samples(name, getattr(self, name), shape=shape).copy()
                 array.flags.writeable = False
                 object.__setattr__(self, name, array)
 
@@ -154,8 +154,8 @@ def load_log(path: str | os.PathLike[str], n_joints: int, *, force_on: str | Non
     BadInput
         With file, place, what was found and what is allowed.
     """
-    source = validation.path("path", path)
-    n_joints = validation.whole("n_joints", n_joints, least=2, most=3)
+    source = checks.path("path", path)
+    n_joints = checks.whole("n_joints", n_joints, least=2, most=3)
     try:
         return _read(source, n_joints, force_on)
     except BadInput as error:
@@ -175,7 +175,7 @@ def _read(source: Path, n_joints: int, force_on: str | None) -> Log:
         raise BadInput("force_on", Text("nothing, beside forces"), '"arm" or "robot": what the forces act on')
     sign = 1.0
     if has_force:
-        sign = 1.0 if validation.choice("force_on", force_on, ("arm", "robot")) == "arm" else -1.0
+        sign = 1.0 if checks.choice("force_on", force_on, ("arm", "robot")) == "arm" else -1.0
     empty = np.flatnonzero(np.isnan(found["t"]))
     if empty.size:
         raise BadInput(f"{samples.place_of(int(empty[0]))}, time", Text("an empty cell"), "a time stamp in every row")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..io.trial import Trial, refuse_moving_base
 from ..model import Model, load_model
@@ -165,20 +165,20 @@ def replay(
     --------
     >>> replay("log.csv", "identified.toml", force_on="arm").plot("health")  # doctest: +SKIP
     """
-    loaded = validation.loaded("model", model, Model, load_model)
+    loaded = checks.loaded("model", model, Model, load_model)
     data = _log(log, loaded, force_on)
     if data.q.shape[1] != loaded.n_joints:
         raise BadInput("log", Text(f"{data.q.shape[1]} joints"), f"{loaded.n_joints}, as the model has")
     data = data.calibrated(loaded)
     if settings is None:
         settings = default_settings(loaded, data.period)
-    validation.instance("settings", settings, Settings)
+    checks.instance("settings", settings, Settings)
     estimator = Estimator(loaded, settings)
     places = data.places(settings.period)
     count = int(places[-1]) + 1
     if every is None:
         every = min(max(1, round(RECORDED / settings.period)), count)
-    every = validation.whole("every", every, least=1)
+    every = checks.whole("every", every, least=1)
     told = estimator.run(*_laid_out(data, places, settings.period), every)
     recorded = np.arange(every - 1, count, every)
     decisions = np.array(_armrs.DECISIONS)
@@ -203,7 +203,7 @@ def replay(
 
 def _log(log: Log | Trial | str | os.PathLike[str], model: Model, force_on: str | None) -> Log:
     if not isinstance(log, (Log, Trial)):
-        validation.path("log", log, Log, Trial)
+        checks.path("log", log, Log, Trial)
         return load_log(log, model.n_joints, force_on=force_on)
     if force_on is not None:
         raise BadInput("force_on", force_on, "a file of forces beside it: a log or trial has forces on the arm")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import BadInput, Text
 
 QUANTITIES = ("angle", "speed", "acceleration", "force", "power")
@@ -44,9 +44,9 @@ class Channel:
     frozen_after: float = math.inf
 
     def __post_init__(self) -> None:
-        validation.choice("quantity", self.quantity, QUANTITIES)
+        checks.choice("quantity", self.quantity, QUANTITIES)
         for name in ("min", "max", "fastest", "farthest", "frozen_after"):
-            value = float(validation.samples(name, getattr(self, name), shape=()))
+            value = float(checks.samples(name, getattr(self, name), shape=()))
             if math.isnan(value) or (name not in ("min", "max") and value <= 0.0):
                 raise BadInput(name, value, "a number" if name in ("min", "max") else "a number above 0, infinite for any")
             if name == "frozen_after" and _LONGEST < value < math.inf:
@@ -110,8 +110,8 @@ class Monitor:
     """
 
     def __init__(self, channels: Iterable[Channel], oldest: float, period: float) -> None:
-        self.channels = validation.instances("channels", channels, Channel)
-        times = [validation.number(name, t, above=0.0, most=_LONGEST, unit="s") for name, t in (("oldest", oldest), ("period", period))]
+        self.channels = checks.instances("channels", channels, Channel)
+        times = [checks.number(name, t, above=0.0, most=_LONGEST, unit="s") for name, t in (("oldest", oldest), ("period", period))]
         self.oldest, self.period = times
         self._inner = _armrs.OnlineMonitor([c.limits() for c in self.channels], *(max(1, round(t * _MICRO)) for t in times))
 
@@ -132,14 +132,12 @@ class Monitor:
         moving : bool
             Whether motion is commanded that must change the channels.
         """
-        row = validation.samples("values", values, shape=(len(self.channels),))
+        row = checks.samples("values", values, shape=(len(self.channels),))
         clock = [
-            validation.number(name, t, least=0.0, most=_LONGEST, unit="s")
+            checks.number(name, t, least=0.0, most=_LONGEST, unit="s")
             for name, t in (("now", now), ("stamp", now if stamp is None else stamp))
         ]
-        return self._run(
-            np.array([clock[0]]), np.array([clock[1]]), row[None, :], np.full((1, len(row)), validation.flag("moving", moving))
-        )
+        return self._run(np.array([clock[0]]), np.array([clock[1]]), row[None, :], np.full((1, len(row)), checks.flag("moving", moving)))
 
     def reset(self) -> None:
         """Let a stopped device start again; nothing is remembered of the time before."""
@@ -179,11 +177,11 @@ def watch(
         Where motion is commanded; nowhere when absent, so that nothing counts as frozen.
     """
     monitor = Monitor(channels, period if oldest is None else oldest, period)
-    clock = validation.numbers("t", t, "s", shape=(None,))
+    clock = checks.numbers("t", t, "s", shape=(None,))
     if len(clock) and np.ptp(clock) > _LONGEST:
         raise BadInput("t", Text(f"{np.ptp(clock):.3g} s"), f"a log of at most {_LONGEST:g} s")
     n, count = len(clock), len(monitor.channels)
-    rows = validation.samples("values", values, shape=(n, count))
+    rows = checks.samples("values", values, shape=(n, count))
     commanded = np.zeros(n, dtype=bool) if moving is None else np.asarray(moving)
     if commanded.dtype != bool or commanded.shape != (n,):
         raise BadInput("moving", Text(f"{commanded.dtype} of shape {commanded.shape}"), f"true or false, shape ({n},)")

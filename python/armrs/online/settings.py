@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import unknown_name
 from ..model import Model, load_model
 
@@ -69,14 +69,14 @@ class Settings:
     precision: str = "double"
 
     def __post_init__(self) -> None:
-        validation.choice("precision", self.precision, PRECISIONS)
+        checks.choice("precision", self.precision, PRECISIONS)
         numbers = ("period", "cutoff", "window", "dead_band", "fastest", "steepest", "largest_force", "largest_torque", "gate")
         for name in (*numbers, "frozen_after", "forgetting"):
-            value = validation.samples(name, getattr(self, name), shape=())
+            value = checks.samples(name, getattr(self, name), shape=())
             object.__setattr__(self, name, float(value))
         for name in ("noise", "envelope"):
-            object.__setattr__(self, name, tuple(validation.samples(name, getattr(self, name), shape=(None,)).tolist()))
-        pairs = validation.samples("range", self.range, shape=(None, 2))
+            object.__setattr__(self, name, tuple(checks.samples(name, getattr(self, name), shape=(None,)).tolist()))
+        pairs = checks.samples("range", self.range, shape=(None, 2))
         object.__setattr__(self, "range", tuple((low, high) for low, high in pairs.tolist()))
 
     def replace(self, **changes: Any) -> Settings:
@@ -106,8 +106,8 @@ def default_settings(model: Model | str | os.PathLike[str], period: float, preci
     >>> default_settings(true_model(), period=1e-3).gate
     8.0
     """
-    loaded = validation.loaded("model", model, Model, load_model)
-    period = validation.number("period", period, above=0.0, unit="s")
-    validation.choice("precision", precision, PRECISIONS)
+    loaded = checks.loaded("model", model, Model, load_model)
+    period = checks.number("period", period, above=0.0, unit="s")
+    checks.choice("precision", precision, PRECISIONS)
     told = _armrs.online_settings(_armrs.Rig(loaded), period, precision)
     return Settings(**told, precision=precision)  # type: ignore[arg-type]

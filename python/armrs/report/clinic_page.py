@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import validation
+from .. import checks
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import tomlfile
@@ -148,24 +148,24 @@ def load_norms(path: str | os.PathLike[str]) -> tuple[Norm, ...]:
 
 
 def _norms(document: Mapping[str, Any], _: Path) -> tuple[Norm, ...]:
-    validation.keys("", document, required=["norm"])
+    checks.keys("", document, required=["norm"])
     norms = []
-    for k, table in enumerate(validation.tables("norm", document["norm"]), start=1):
+    for k, table in enumerate(checks.tables("norm", document["norm"]), start=1):
         place = f"[[norm]] {k}"
-        validation.keys(place, table, required=["kind", "name", "joint", "low", "high", "source"])
+        checks.keys(place, table, required=["kind", "name", "joint", "low", "high", "source"])
         known = [(q.kind, q.parameter) for q in (*QUANTITIES, *SLOW)]
         if (table["kind"], table["name"]) not in known:
             allowed = " or ".join(f"{kind} {parameter}" for kind, parameter in known)
             raise BadInput(place, Text(f"{table['kind']} {table['name']}"), allowed)
-        low = validation.number(f"{place}, low", table["low"])
+        low = checks.number(f"{place}, low", table["low"])
         norms.append(
             Norm(
                 table["kind"],
                 table["name"],
-                validation.whole(f"{place}, joint", table["joint"], least=1),
+                checks.whole(f"{place}, joint", table["joint"], least=1),
                 low,
-                validation.number(f"{place}, high", table["high"], above=low),
-                validation.text(f"{place}, source", table["source"]),
+                checks.number(f"{place}, high", table["high"], above=low),
+                checks.text(f"{place}, source", table["source"]),
             )
         )
     return tuple(norms)
@@ -183,7 +183,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
     norms : sequence of Norm
         What is usual, where it is known.
     """
-    target = validation.path("path", path)
+    target = checks.path("path", path)
     results = [pages.read_result(source) for source in sources]
     for source, result in zip(sources, results, strict=True):
         if result["verb"] not in ANALYSED:

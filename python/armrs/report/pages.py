@@ -16,7 +16,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from .. import validation, view_registry
+from .. import checks, view_registry
 from ..errors import BadInput, Text
 from ..io import files, jsonfile
 from . import html, interactive, sentences, tables
@@ -105,11 +105,11 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
     BadInput
         For a file that is no result; nothing is written then.
     """
-    target = validation.path("path", path)
+    target = checks.path("path", path)
     if isinstance(sources, (str, bytes)) or not isinstance(sources, Iterable):
         raise BadInput("sources", sources, "a sequence of paths")
     engine = html.environment()
-    parts = [_part(engine, validation.path(f"sources[{k}]", source), k + 1) for k, source in enumerate(sources)]
+    parts = [_part(engine, checks.path(f"sources[{k}]", source), k + 1) for k, source in enumerate(sources)]
     _write(engine, target, parts, maker)
     return target
 

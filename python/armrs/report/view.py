@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text, unknown_name
 from . import html, interactive, pages, plotting
 from .figures import Drawn, Figures, draw, shown
@@ -41,13 +41,13 @@ class View:
         figures = self.figures(result, self.data(result))
         if not figures:
             raise BadInput("plot", Text("nothing to draw in this result"), "a result with values")
-        if name is not None and validation.text("name", name) not in figures:
+        if name is not None and checks.text("name", name) not in figures:
             raise unknown_name("name", name, figures, what="figure")
         return shown(figures[next(iter(figures)) if name is None else name])
 
     def report(self, result: object, path: str | os.PathLike[str]) -> Path:
         """Write the report as one HTML page with its figures in it."""
-        target = validation.path("path", path)
+        target = checks.path("path", path)
         if target.suffix.lower() != ".html":
             raise BadInput("path", str(target), "the name of a file that ends with .html")
         data = self.data(result)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..analysis.passivity_checks import SLOW
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..formatting import how_many
@@ -124,8 +124,8 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     True
     """
     problems: list[Problem] = []
-    validation.path("source", source)
-    tell = validation.progress(progress)
+    checks.path("source", source)
+    tell = checks.progress(progress)
     tell("reading", 0.0)
     described = _caught(lambda: describe(source), problems)
     if described is None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..analysis import mixed_model, students_t
 from ..analysis.mixed_model import MixedModel
 from ..errors import ArmrsError, BadInput, Text
@@ -213,7 +213,7 @@ def cohort(
     >>> armrs.cohort("values.csv").quantities[0].norm  # doctest: +SKIP
     (0.31, 0.74)
     """
-    path, tell = validation.path("source", source), validation.progress(progress)
+    path, tell = checks.path("source", source), checks.progress(progress)
     if path.is_dir():
         values, warnings = _of_folder(path, _groups(groups), tell)
     elif groups is not None:
@@ -364,7 +364,7 @@ def _groups(path: str | os.PathLike[str] | None) -> Mapping[str, tuple[str, str]
     """Return group and side by the name of a subject or of a data set."""
     if path is None:
         return {}
-    file = validation.path("groups", path)
+    file = checks.path("groups", path)
     return {row["subject"]: (row.get("group", ""), row.get("side", "")) for _, row in _rows(file, ["subject"], ["group", "side"])}
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..anthropometry import JOINTS, UNCERTAINTY, literature_arm, segments_of
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
@@ -249,11 +249,11 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
         "support",
         "perturbation",
     ]
-    validation.keys("", document, required=["movement"], optional=["name", "seed", "model", "believed", *tables])
-    seed = validation.whole("seed", document.get("seed", 1), least=0, most=2**53)
+    checks.keys("", document, required=["movement"], optional=["name", "seed", "model", "believed", *tables])
+    seed = checks.whole("seed", document.get("seed", 1), least=0, most=2**53)
     subject, truth, believed = _arms(document, path, seed, alter)
     n = truth.n_joints
-    runs = tuple(_run(f"[[movement]] {k}", t, n) for k, t in enumerate(validation.tables("movement", document["movement"]), 1))
+    runs = tuple(_run(f"[[movement]] {k}", t, n) for k, t in enumerate(checks.tables("movement", document["movement"]), 1))
     names = [run.configuration for run in runs]
     for k, name in enumerate(names):
         # Trials are files of this name below the requested folder, and nowhere else.
@@ -263,25 +263,25 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
             raise BadInput(f"[[movement]] {k + 1}, configuration", name, "each configuration once")
     if not any(run.repeats for run in runs):
         raise BadInput("[[movement]]", Text("no repeats"), "at least one trial to fit")
-    faults = tuple(_fault(f"[[fault]] {k}", t, names) for k, t in enumerate(validation.tables("fault", document.get("fault", [])), 1))
-    variation = validation.table("[variation]", document.get("variation", {}))
-    validation.keys("[variation]", variation, optional=["moment_Nm"])
+    faults = tuple(_fault(f"[[fault]] {k}", t, names) for k, t in enumerate(checks.tables("fault", document.get("fault", [])), 1))
+    variation = checks.table("[variation]", document.get("variation", {}))
+    checks.keys("[variation]", variation, optional=["moment_Nm"])
     moments = variation.get("moment_Nm", [0.0] * n)
     if not isinstance(moments, list) or len(moments) != n:
         raise BadInput("[variation], moment_Nm", moments, f"{n} numbers, one a joint")
     interaction, support, perturbation = _yielding(document, path, n)
     margin = {} if interaction is None else {"angle_margin_deg": YIELDING_MARGIN_DEG}
     return Experiment(
-        name=validation.text("name", document.get("name", path.stem)),
+        name=checks.text("name", document.get("name", path.stem)),
         seed=seed,
         truth=truth,
         believed=believed,
         subject=subject,
         runs=runs,
         controller=_settings(Controller, "[controller]", document.get("controller", {})),
-        safety=_settings(Safety, "[safety]", margin | validation.table("[safety]", document.get("safety", {}))),
+        safety=_settings(Safety, "[safety]", margin | checks.table("[safety]", document.get("safety", {}))),
         devices=_devices(document.get("sensors", {}), truth),
-        variation_Nm=np.array([validation.number("[variation], moment_Nm", v, least=0.0, unit="N m") for v in moments]),
+        variation_Nm=np.array([checks.number("[variation], moment_Nm", v, least=0.0, unit="N m") for v in moments]),
         faults=faults,
         tolerance=Tolerance.from_dict(document.get("tolerance", {}), "[tolerance]"),
         file=str(path),
@@ -310,7 +310,7 @@ def _yielding(document: Mapping[str, Any], path: Path, n_joints: int) -> tuple[I
             raise BadInput("[interaction], hold_s", interaction.hold_s, allowed)
     if "support" not in document:
         return interaction, None, perturbation
-    table = validation.table("[support]", document["support"])
+    table = checks.table("[support]", document["support"])
     if "model" not in table:
         raise BadInput("[support], model", Text("nothing"), "the file of a model that was identified")
     support: Support = _part_of(Support, "[support]", table | {"model": model_at("[support], model", table["model"], path)})
@@ -321,7 +321,7 @@ def _yielding(document: Mapping[str, Any], path: Path, n_joints: int) -> tuple[I
 
 def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[Model], Model]) -> tuple[Subject, Model, Model]:
     """Return the subject, the arm that is simulated and the arm that is handed over."""
-    table = validation.table("[subject]", document.get("subject", {}))
+    table = checks.table("[subject]", document.get("subject", {}))
     own: dict[str, Any] = {key: table.pop(key) for key in ("segments", "lengths_m", "spread") if key in table}
     subject = Subject.from_dict(table, "[subject]")
     if "model" in document:
@@ -339,14 +339,14 @@ def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[M
         if "believed" in document:
             raise BadInput("believed", Text("a value without model"), "model as well; of a subject the literature is believed")
         truth, believed = _person(document, subject, own, seed)
-    given = validation.tables("effect", document.get("effect", []))
+    given = checks.tables("effect", document.get("effect", []))
     added = Model.from_dict({**truth.to_dict(), "effect": given}).effects
     truth = truth.replace(effects=(*truth.effects, *added))
     believed = believed.replace(robot=truth.robot, contact=truth.contact)
     truth = alter(truth)
-    handle = validation.table("[handle]", document.get("handle", {}))
-    validation.keys("[handle]", handle, optional=["mass"])
-    mass = validation.number("[handle], mass", handle.get("mass", 0.0), least=0.0, most=10.0, unit="kg")
+    handle = checks.table("[handle]", document.get("handle", {}))
+    checks.keys("[handle]", handle, optional=["mass"])
+    mass = checks.number("[handle], mass", handle.get("mass", 0.0), least=0.0, most=10.0, unit="kg")
     if mass > 0.0:
         truth, believed = (model.with_mass(model.n_joints, mass) for model in (truth, believed))
     return subject, truth, believed
@@ -354,16 +354,16 @@ def _arms(document: Mapping[str, Any], path: Path, seed: int, alter: Callable[[M
 
 def model_at(place: str, value: object, path: Path) -> Model:
     """Return the model that a key of the experiment file `path` names."""
-    return value if isinstance(value, Model) else load_model(path.parent / validation.text(place, value))
+    return value if isinstance(value, Model) else load_model(path.parent / checks.text(place, value))
 
 
 def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], seed: int) -> tuple[Model, Model]:
-    count = validation.whole("[subject], segments", own.get("segments", 2), least=2, most=3)
-    spread = validation.number("[subject], spread", own.get("spread", 0.0), least=0.0, most=3.0)
+    count = checks.whole("[subject], segments", own.get("segments", 2), least=2, most=3)
+    spread = checks.number("[subject], spread", own.get("spread", 0.0), least=0.0, most=3.0)
     lengths = own.get("lengths_m", [None] * count)
     if not isinstance(lengths, list) or len(lengths) != count:
         raise BadInput("[subject], lengths_m", lengths, f"{count} lengths")
-    lengths = [None if v is None else validation.number("[subject], lengths_m", v, least=0.01, most=1.0, unit="m") for v in lengths]
+    lengths = [None if v is None else checks.number("[subject], lengths_m", v, least=0.01, most=1.0, unit="m") for v in lengths]
     believed, parts = literature_arm(subject, lengths)
     draw = np.random.default_rng([seed, 0]).standard_normal((3, 3)) * spread
     true_parts = [
@@ -376,7 +376,7 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
         }
         for part, row in zip(parts, draw, strict=True)
     ]
-    tables = validation.tables("joint", document.get("joint", []))
+    tables = checks.tables("joint", document.get("joint", []))
     if tables and len(tables) != count:
         raise BadInput("[[joint]]", Text(f"{len(tables)} joints"), f"none, or one a segment: {count}")
     joints = tuple(Joint.from_dict({"name": JOINTS[k - 1], **t}, f"[[joint]] {k}") for k, t in enumerate(tables, 1))
@@ -391,10 +391,10 @@ def _person(document: Mapping[str, Any], subject: Subject, own: dict[str, Any], 
 
 def _part_of(kind: Any, place: str, value: object) -> Any:
     """Return the dataclass `kind` that a table describes; `place` names the table in refusals."""
-    table = validation.table(place, value)
+    table = checks.table(place, value)
     own = dataclasses.fields(kind)
     optional = [f.name for f in own if f.default is not dataclasses.MISSING]
-    validation.keys(place, table, required=[f.name for f in own if f.name not in optional], optional=optional)
+    checks.keys(place, table, required=[f.name for f in own if f.name not in optional], optional=optional)
     try:
         return kind(**table)
     except BadInput as error:
@@ -405,14 +405,14 @@ def _run(place: str, table: Mapping[str, Any], n_joints: int) -> Run:
     fields = dict(table)
     own = {key: fields.pop(key) for key in ("configuration", "repeats", "tests", "worn") if key in fields}
     try:
-        worn = tuple(AddedMass.from_dict(t, f"worn {k}") for k, t in enumerate(validation.tables("worn", own.get("worn", [])), 1))
+        worn = tuple(AddedMass.from_dict(t, f"worn {k}") for k, t in enumerate(checks.tables("worn", own.get("worn", [])), 1))
         for item in worn:
-            validation.whole("worn, segment", item.segment, least=1, most=n_joints)
+            checks.whole("worn, segment", item.segment, least=1, most=n_joints)
         return Run(
-            configuration=validation.text("configuration", own.get("configuration", "movement")),
+            configuration=checks.text("configuration", own.get("configuration", "movement")),
             movement=movement_of(fields, n_joints),
-            repeats=validation.whole("repeats", own.get("repeats", 1), least=0, most=1000),
-            tests=validation.whole("tests", own.get("tests", 0), least=0, most=1000),
+            repeats=checks.whole("repeats", own.get("repeats", 1), least=0, most=1000),
+            tests=checks.whole("tests", own.get("tests", 0), least=0, most=1000),
             worn=worn,
         )
     except BadInput as error:
@@ -422,14 +422,14 @@ def _run(place: str, table: Mapping[str, Any], n_joints: int) -> Run:
 def _fault(place: str, table: Mapping[str, Any], configurations: list[str]) -> Fault:
     fault: Fault = _part_of(Fault, place, table)
     try:
-        validation.choice("kind", fault.kind, FAULTS)
-        validation.number("at_s", fault.at_s, least=0.0, unit="s")
-        validation.whole("joint", fault.joint, least=1, most=2)
-        validation.number("delay_s", fault.delay_s, above=0.0, unit="s")
+        checks.choice("kind", fault.kind, FAULTS)
+        checks.number("at_s", fault.at_s, least=0.0, unit="s")
+        checks.whole("joint", fault.joint, least=1, most=2)
+        checks.number("delay_s", fault.delay_s, above=0.0, unit="s")
         if fault.configuration is not None:
-            validation.choice("configuration", fault.configuration, tuple(configurations))
+            checks.choice("configuration", fault.configuration, tuple(configurations))
         return dataclasses.replace(
-            fault, force_N=validation.pair("force_N", fault.force_N, unit="N"), configuration=fault.configuration or configurations[0]
+            fault, force_N=checks.pair("force_N", fault.force_N, unit="N"), configuration=fault.configuration or configurations[0]
         )
     except BadInput as error:
         raise error.within(place=place) from None
@@ -438,7 +438,7 @@ def _fault(place: str, table: Mapping[str, Any], configurations: list[str]) -> F
 def _settings(kind: Any, place: str, table: object) -> Any:
     made = _part_of(kind, place, table)
     for field in dataclasses.fields(kind):
-        validation.number(f"{place}, {field.name}", getattr(made, field.name), above=0.0)
+        checks.number(f"{place}, {field.name}", getattr(made, field.name), above=0.0)
     return made
 
 
@@ -451,7 +451,7 @@ _MOST = {
 
 def _devices(value: object, truth: Model) -> Devices:
     place = "[sensors]"
-    table = validation.table(place, value)
+    table = checks.table(place, value)
     if "six_axis" in table:
         for key in ("force_noise_N", "force_range_N", "force_bits", "moment_noise_Nm"):
             if key in table:
@@ -462,16 +462,16 @@ def _devices(value: object, truth: Model) -> Devices:
                 raise BadInput("[sensors.six_axis]", Text(f"the effect {effect.kind}"), "none of the frame: the tool's weight is along −z")
         table["six_axis"] = _part_of(SixAxis, "[sensors.six_axis]", table["six_axis"])
     made: Devices = _part_of(Devices, place, table)
-    validation.bits(f"{place}, force_bits", made.force_bits)
-    validation.flag(f"{place}, emg", made.emg)
-    validation.number(f"{place}, rate_Hz", made.rate_Hz, least=10.0, most=1000.0, unit="Hz")
-    validation.number(f"{place}, force_range_N", made.force_range_N, above=0.0, most=1e5, unit="N")
-    validation.number(f"{place}, marker_gaps", made.marker_gaps, least=0.0, most=0.5)
+    checks.bits(f"{place}, force_bits", made.force_bits)
+    checks.flag(f"{place}, emg", made.emg)
+    checks.number(f"{place}, rate_Hz", made.rate_Hz, least=10.0, most=1000.0, unit="Hz")
+    checks.number(f"{place}, force_range_N", made.force_range_N, above=0.0, most=1e5, unit="N")
+    checks.number(f"{place}, marker_gaps", made.marker_gaps, least=0.0, most=0.5)
     for name, (most, unit) in _MOST.items():
         if getattr(made, name) is not None:
-            validation.number(f"{place}, {name}", getattr(made, name), least=0.0, most=most, unit=unit)
-    validation.number(f"{place}, clock_offset_s", made.clock_offset_s, least=-1.0, most=1.0, unit="s")
-    validation.number(f"{place}, clock_drift", made.clock_drift, least=-0.01, most=0.01)
+            checks.number(f"{place}, {name}", getattr(made, name), least=0.0, most=most, unit=unit)
+    checks.number(f"{place}, clock_offset_s", made.clock_offset_s, least=-1.0, most=1.0, unit="s")
+    checks.number(f"{place}, clock_drift", made.clock_drift, least=-0.01, most=0.01)
     return made
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import files, jsonfile
@@ -49,7 +49,7 @@ class FirmwareSource:
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write both files below a folder."""
-        folder = validation.path("folder", folder)
+        folder = checks.path("folder", folder)
         folder.mkdir(parents=True, exist_ok=True)
         written = []
         for name, text in (("armrs_model.h", self.header), ("armrs_model.c", self.source)):
@@ -90,8 +90,8 @@ def export_c(
     >>> from armrs import load_model
     >>> export_c("model.toml", precision="single").write("firmware")  # doctest: +SKIP
     """
-    validation.choice("precision", precision, ("double", "single"))
-    loaded = validation.loaded("model", model, Model, load_model)
+    checks.choice("precision", precision, ("double", "single"))
+    loaded = checks.loaded("model", model, Model, load_model)
     digest = hashlib.sha256(loaded.to_toml().encode()).hexdigest()
     vectors = _vectors(loaded.n_joints)
     core = _armrs.firmware(_armrs.Rig(loaded), loaded.segment_uncertainty, vectors.tolist())
@@ -140,7 +140,7 @@ def _covariance(model: Model, core: _Firmware, path: str | os.PathLike[str] | No
     linear = _linear(model, core)
     if path is None:
         return np.diag(np.square([*core["sd"][:base], *(0.0 for _ in linear)]))
-    result = _result(validation.path("identified", path))
+    result = _result(checks.path("identified", path))
     combinations = result["combinations"]
     if len(combinations) != base:
         raise BadInput("combinations", Text(f"{len(combinations)} of them"), f"{base} for {model.n_joints} segments", file=Path(path))

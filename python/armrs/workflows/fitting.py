@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from .._armrs import RunFit as RunFit
 from ..catalogue import catalogue
 from ..errors import BadInput
@@ -103,15 +103,15 @@ def fit_by_simulation(
     SimulationError
         When the first run stops early.
     """
-    model = validation.loaded("model", model, Model, load_model)
-    validation.instance("drive", drive, Movement, Trial, type(None))
-    validation.choice("integrator", integrator, ("rk4", "euler"))
+    model = checks.loaded("model", model, Model, load_model)
+    checks.instance("drive", drive, Movement, Trial, type(None))
+    checks.choice("integrator", integrator, ("rk4", "euler"))
     positive = {"dt": (dt, "s"), "rate": (rate, "Hz"), "angle_noise": (angle_noise, "rad"), "force_noise": (force_noise, "N")}
     for name, (value, unit) in positive.items():
-        validation.number(name, value, above=0.0, unit=unit)
+        checks.number(name, value, above=0.0, unit=unit)
     angles, force = _recorded(q, force_on_arm, len(model.segments))
     effects = list(model.all_effects)
-    names = list(validation.texts("free", list(free) if isinstance(free, Mapping) else free, "parameters"))
+    names = list(checks.texts("free", list(free) if isinstance(free, Mapping) else free, "parameters"))
     places = [_place(effects, name) for name in names]
     bounds = [_bounds(name, free[name]) if isinstance(free, Mapping) else place[2:] for name, place in zip(names, places, strict=True)]
     start = drive.q[0].tolist() if isinstance(drive, Trial) else None
@@ -141,8 +141,8 @@ def fit_by_simulation(
 
 def _recorded(q: np.ndarray, force_on_arm: np.ndarray, joints: int) -> tuple[np.ndarray, np.ndarray]:
     """Return recorded angles and forces as arrays with a row for each sample."""
-    angles = validation.numbers("q", q, "rad")
-    force = validation.numbers("force_on_arm", force_on_arm, "N")
+    angles = checks.numbers("q", q, "rad")
+    force = checks.numbers("force_on_arm", force_on_arm, "N")
     for name, values, columns in (("q", angles, joints), ("force_on_arm", force, 2)):
         if values.ndim != 2 or values.shape[1] != columns or len(values) != len(angles) or len(values) < 2:
             raise BadInput(name, f"an array of shape {values.shape}", f"rows of {columns}, as many of q as of force_on_arm, two or more")
@@ -151,7 +151,7 @@ def _recorded(q: np.ndarray, force_on_arm: np.ndarray, joints: int) -> tuple[np.
 
 def _bounds(name: str, bounds: tuple[float, float]) -> tuple[float, float]:
     """Return bounds of a parameter, least before greatest."""
-    low, high = validation.pair(f"bounds of {name}", bounds)
+    low, high = checks.pair(f"bounds of {name}", bounds)
     if not low <= high:
         raise BadInput(f"bounds of {name}", (low, high), "least before greatest")
     return low, high

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput
 from ..model import Robot
 
@@ -104,13 +104,13 @@ class SixAxis:
         if self.stated_com_m is None:
             object.__setattr__(self, "stated_com_m", self.tool_com_m)
         for name in ("handle_m", "tool_com_m", "stated_com_m"):
-            object.__setattr__(self, name, validation.pair(name, getattr(self, name), least=-1.0, most=1.0, unit="m"))
+            object.__setattr__(self, name, checks.pair(name, getattr(self, name), least=-1.0, most=1.0, unit="m"))
         for name in ("tool_mass_kg", "stated_mass_kg"):
-            validation.number(name, getattr(self, name), least=0.0, most=20.0, unit="kg")
-        validation.number("tool_inertia_kg_m2", self.tool_inertia_kg_m2, least=0.0, most=1.0, unit="kg m²")
+            checks.number(name, getattr(self, name), least=0.0, most=20.0, unit="kg")
+        checks.number("tool_inertia_kg_m2", self.tool_inertia_kg_m2, least=0.0, most=1.0, unit="kg m²")
         for name, (unit, least, most) in _BOUNDS.items():
             object.__setattr__(self, name, _three(name, getattr(self, name), unit=unit, least=least, most=most))
-        validation.bits("bits", self.bits)
+        checks.bits("bits", self.bits)
         object.__setattr__(self, "crosstalk", _matrix(self.crosstalk))
 
     def read(self, rig: tuple[Robot, float], motion: RobotMotion, force_on_robot: np.ndarray, noise: np.random.Generator) -> np.ndarray:
@@ -189,11 +189,9 @@ def _complex(vectors: np.ndarray) -> np.ndarray:
 def _three(place: str, value: Any, **limits: Any) -> tuple[float, ...]:
     if not isinstance(value, (list, tuple)) or len(value) != 3:
         raise BadInput(place, value, "three numbers: along x, y and z")
-    return tuple(validation.number(f"{place}[{k}]", v, **limits) for k, v in enumerate(value))
+    return tuple(checks.number(f"{place}[{k}]", v, **limits) for k, v in enumerate(value))
 
 
 def _matrix(value: Any) -> tuple[tuple[float, ...], ...]:
-    rows = validation.numbers("crosstalk", value, shape=(6, 6))
-    return tuple(
-        tuple(validation.number(f"crosstalk[{i}][{j}]", v, least=-0.5, most=0.5) for j, v in enumerate(r)) for i, r in enumerate(rows)
-    )
+    rows = checks.numbers("crosstalk", value, shape=(6, 6))
+    return tuple(tuple(checks.number(f"crosstalk[{i}][{j}]", v, least=-0.5, most=0.5) for j, v in enumerate(r)) for i, r in enumerate(rows))

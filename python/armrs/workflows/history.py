@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput, Text, show
 from ..formatting import parameter_label
 from ..io import files
@@ -236,7 +236,7 @@ def without_date(name: str) -> str:
 
 def check(path: str | os.PathLike[str], joints: int, subject: str) -> None:
     """Refuse a history file that cannot be added to, before any work is done."""
-    file = validation.path("history", path)
+    file = checks.path("history", path)
     files.must_be_writable(file)
     if file.is_dir():
         raise BadInput("history", Text("a folder"), "the name of a file", file=file)
@@ -328,7 +328,7 @@ def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> bool
 
 def read(path: str | os.PathLike[str], method: str = "joint") -> History:
     """Return every parameter that the data decided in the last session, over all sessions in which they did."""
-    with _reading(validation.path("history", path)) as connection:
+    with _reading(checks.path("history", path)) as connection:
         return _courses(connection, method)
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .. import _armrs, interruptible, validation
+from .. import _armrs, checks, interruptible
 from .._armrs import Estimate as Estimate
 from .._armrs import Fit as Fit
 from .._armrs import Identification as Identification
@@ -284,7 +284,7 @@ def identify(
     >>> print(result.combinations[0])  # doctest: +SKIP
     m1*l1 + a1*m2 = 0.7032 ± 0.0088 kg m
     """
-    dataset = validation.loaded("dataset", dataset, Dataset, load_dataset)
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     kinds = _checked(dataset, method, with_effects, cutoff, motion, level)
     model = dataset.model
     effects, fitted = effects_of(model, kinds)
@@ -292,7 +292,7 @@ def identify(
     if not model.segment_uncertainty and not any(fitted):
         raise BadInput("[arm], segment_uncertainty", 0.0, "above 0, or an effect to fit: nothing is unknown", file=dataset.model_path)
     settings = CoreSettings(
-        model, fitted, dataset.tolerance, method=method, cutoff=cutoff, motion=motion, level=level, threads=validation.threads(threads)
+        model, fitted, dataset.tolerance, method=method, cutoff=cutoff, motion=motion, level=level, threads=checks.threads(threads)
     )
     refuse_implausible(dataset)
     unproved = examine_setup(dataset)
@@ -326,12 +326,12 @@ def _checked(
 ) -> Sequence[str] | None:
     """Refuse what cannot be identified, or not with these settings; return the kinds of effects to fit."""
     refuse_other_arms(dataset)
-    validation.choice("method", method, ("joint", "cascade"))
-    validation.choice("motion", motion, ("auto", "measured", "simulated"))
-    kinds = validation.texts("with_effects", () if with_effects is None else with_effects, "kinds of effects")
-    validation.number("level", level, **LEVELS)
+    checks.choice("method", method, ("joint", "cascade"))
+    checks.choice("motion", motion, ("auto", "measured", "simulated"))
+    kinds = checks.texts("with_effects", () if with_effects is None else with_effects, "kinds of effects")
+    checks.number("level", level, **LEVELS)
     slowest = min(trial.rate for trial in dataset.trials)
-    if cutoff is not None and validation.number("cutoff", cutoff, above=0.0, unit="Hz") >= 0.4 * slowest:
+    if cutoff is not None and checks.number("cutoff", cutoff, above=0.0, unit="Hz") >= 0.4 * slowest:
         raise BadInput("cutoff", Text(f"{cutoff:g} Hz"), f"below {0.4 * slowest:.4g} Hz, 0.4 of the lowest sample rate")
     if method == "cascade":
         cascade_can(kinds, motion)
@@ -445,7 +445,7 @@ _NO_LAWS = ("segment", "muscle")
 
 def effects_of(model: Model, with_effects: Sequence[str] | None) -> tuple[list[Effect], list[bool]]:
     """Return the effects of a model with those requested, or with passive laws where joints have none, and which of them are fitted."""
-    wanted = None if with_effects is None else validation.texts("with_effects", with_effects, "kinds of effects")
+    wanted = None if with_effects is None else checks.texts("with_effects", with_effects, "kinds of effects")
     effects = [*model.all_effects, *(_passive_laws(model) if wanted is None else _added(model, wanted))]
     return effects, [e.kind in _joint_kinds() for e in effects]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import validation
+from .. import checks
 from ..anthropometry import SEGMENTS, UNCERTAINTY, check_lengths, literature_model
 from ..errors import BadInput, Text
 from ..io import files
@@ -43,10 +43,10 @@ class Worn:
     at: float | None = None
 
     def __post_init__(self) -> None:
-        validation.whole("segment", self.segment, least=1)
-        object.__setattr__(self, "mass", validation.number("mass", self.mass, above=0.0, most=20.0, unit="kg"))
+        checks.whole("segment", self.segment, least=1)
+        object.__setattr__(self, "mass", checks.number("mass", self.mass, above=0.0, most=20.0, unit="kg"))
         if self.at is not None:
-            object.__setattr__(self, "at", validation.number("at", self.at, least=0.0, most=2.0, unit="m", hint="millimetres?"))
+            object.__setattr__(self, "at", checks.number("at", self.at, least=0.0, most=2.0, unit="m", hint="millimetres?"))
 
 
 @dataclass(frozen=True)
@@ -118,11 +118,11 @@ def initialise(
     With two lengths the hand belongs to the forearm, which then reaches from elbow to handle.
     """
     target = files.output_folder(folder)
-    validation.flag("replace", replace)
+    checks.flag("replace", replace)
     check_lengths(lengths)
-    worn = validation.instances("worn", worn, Worn)
+    worn = checks.instances("worn", worn, Worn)
     if robot is not None:
-        validation.instance("robot", robot, Robot)
+        checks.instance("robot", robot, Robot)
     for name in ("dataset.toml", "model.toml"):
         if (target / name).exists() and not replace:
             raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)

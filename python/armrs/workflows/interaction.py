@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..errors import BadInput, Text
 from ..model import Model, Robot
 from .firmware import covariance_of
@@ -53,12 +53,12 @@ class Interaction:
     hold_s: float = 2.0
 
     def __post_init__(self) -> None:
-        validation.choice("law", self.law, ("impedance", "admittance"))
-        validation.number("stiffness_N_m", self.stiffness_N_m, least=0.0, most=20_000.0, unit="N/m")
-        validation.number("damping_N_s_m", self.damping_N_s_m, above=0.0, unit="N s/m")
-        validation.number("mass_kg", self.mass_kg, above=0.0, unit="kg")
-        object.__setattr__(self, "link_masses_kg", validation.pair("link_masses_kg", self.link_masses_kg, unit="kg"))
-        validation.number("hold_s", self.hold_s, least=AT_END, most=600.0, unit="s")
+        checks.choice("law", self.law, ("impedance", "admittance"))
+        checks.number("stiffness_N_m", self.stiffness_N_m, least=0.0, most=20_000.0, unit="N/m")
+        checks.number("damping_N_s_m", self.damping_N_s_m, above=0.0, unit="N s/m")
+        checks.number("mass_kg", self.mass_kg, above=0.0, unit="kg")
+        object.__setattr__(self, "link_masses_kg", checks.pair("link_masses_kg", self.link_masses_kg, unit="kg"))
+        checks.number("hold_s", self.hold_s, least=AT_END, most=600.0, unit="s")
 
     def core(self) -> _Yielding:
         """Return it as the core takes it."""
@@ -92,10 +92,10 @@ class Perturbation:
     to_Hz: float = 5.0
 
     def __post_init__(self) -> None:
-        validation.choice("kind", self.kind, ("multisine", "prbs", "ramps"))
-        validation.number("amplitude_N", self.amplitude_N, above=0.0, most=50.0, unit="N")
-        validation.number("from_Hz", self.from_Hz, least=1.0 / PERIOD, unit="Hz")
-        validation.number("to_Hz", self.to_Hz, above=self.from_Hz, most=50.0, unit="Hz")
+        checks.choice("kind", self.kind, ("multisine", "prbs", "ramps"))
+        checks.number("amplitude_N", self.amplitude_N, above=0.0, most=50.0, unit="N")
+        checks.number("from_Hz", self.from_Hz, least=1.0 / PERIOD, unit="Hz")
+        checks.number("to_Hz", self.to_Hz, above=self.from_Hz, most=50.0, unit="Hz")
 
     def force(self, draw: np.random.Generator) -> np.ndarray:
         """Return the force in each control period of one repeat, shape (n, 2) [N]."""
@@ -136,8 +136,8 @@ class Support:
     limit_Nm: float = 30.0
 
     def __post_init__(self) -> None:
-        validation.number("share", self.share, above=0.0, most=5.0)
-        validation.number("limit_Nm", self.limit_Nm, above=0.0, unit="N m")
+        checks.number("share", self.share, above=0.0, most=5.0)
+        checks.number("limit_Nm", self.limit_Nm, above=0.0, unit="N m")
 
     def core(self) -> tuple[_armrs.OnlineCompensation, float, float]:
         """Return it as the core takes it."""

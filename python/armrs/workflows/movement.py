@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from ..errors import BadInput
 from ..io import tomlfile
 
@@ -42,17 +42,17 @@ class Movement:
     file: str | None = None
 
     def __post_init__(self) -> None:
-        points = validation.numbers("waypoints", self.waypoints, "rad")
+        points = checks.numbers("waypoints", self.waypoints, "rad")
         if points.ndim != 2 or len(points) < 2 or not points.size:
             raise BadInput("waypoints", f"an array of shape {points.shape}", "two or more rows of joint angles")
         if np.abs(points).max(initial=0.0) > 4 * np.pi:
             raise BadInput("waypoints", float(np.abs(points).max()), "angles within two turns, in radians", hint="looks like degrees")
-        validation.number("speed", self.speed, above=0.0, unit="rad/s")
-        validation.number("acceleration", self.acceleration, above=0.0, unit="rad/s²")
-        validation.number("pause", self.pause, least=0.0, unit="s")
-        validation.choice("shape", self.shape, ("trapezoid", "smooth"))
+        checks.number("speed", self.speed, above=0.0, unit="rad/s")
+        checks.number("acceleration", self.acceleration, above=0.0, unit="rad/s²")
+        checks.number("pause", self.pause, least=0.0, unit="s")
+        checks.choice("shape", self.shape, ("trapezoid", "smooth"))
         if self.file is not None:
-            validation.text("file", self.file)
+            checks.text("file", self.file)
         points.flags.writeable = False
         object.__setattr__(self, "waypoints", points)
 
@@ -75,13 +75,13 @@ def load_movement(path: str | os.PathLike[str], n_joints: int | None = None) -> 
     BadInput
         For a file that is no movement, or one of another number of joints.
     """
-    validation.path("path", path)
+    checks.path("path", path)
     if n_joints is not None:
-        validation.whole("n_joints", n_joints, least=1)
+        checks.whole("n_joints", n_joints, least=1)
 
     def made(document: dict[str, Any], _: object) -> Movement:
-        validation.keys("", document, required=["movement"])
-        return dataclasses.replace(movement_of(validation.table("movement", document["movement"]), n_joints), file=os.fspath(path))
+        checks.keys("", document, required=["movement"])
+        return dataclasses.replace(movement_of(checks.table("movement", document["movement"]), n_joints), file=os.fspath(path))
 
     return tomlfile.load(path, made)
 
@@ -91,7 +91,7 @@ def movement_of(table: dict[str, Any], n_joints: int | None) -> Movement:
     known = [
         "waypoints_deg", "waypoints_rad", "speed_rad_s", "speed_deg_s", "acceleration_rad_s2", "acceleration_deg_s2", "pause_s", "shape",
     ]  # fmt: skip
-    validation.keys("movement", table, optional=known)
+    checks.keys("movement", table, optional=known)
     fields: dict[str, Any] = {}
     for name in known:
         if name not in table:
@@ -103,7 +103,7 @@ def movement_of(table: dict[str, Any], n_joints: int | None) -> Movement:
                 raise BadInput("movement.shape", value, "trapezoid or smooth")
             fields[key] = value
             continue
-        numbers = validation.samples(f"movement.{name}", value)
+        numbers = checks.samples(f"movement.{name}", value)
         if not np.isfinite(numbers).all() or (key != "waypoints" and numbers.ndim):
             raise BadInput(f"movement.{name}", value, "finite numbers" if key == "waypoints" else "one finite number")
         if key in fields:

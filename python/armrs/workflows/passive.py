@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..analysis import (
     double_exponential,
     joint_coupling,
@@ -319,10 +319,10 @@ def passive_moments(
     BadInput
         For settings out of range, and a trial with neither forces nor joint torques.
     """
-    dataset = validation.loaded("dataset", dataset, Dataset, load_dataset)
-    bins = validation.whole("bins", bins, least=2, most=1000)
-    cutoff = validation.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
-    tell = validation.progress(progress)
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    bins = checks.whole("bins", bins, least=2, most=1000)
+    cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
+    tell = checks.progress(progress)
     refuse_implausible(dataset)
     trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
     trials, conditioned = _without_preconditioning(trials)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _armrs, interruptible, validation
+from .. import _armrs, checks, interruptible
 from .._armrs import Design as Design
 from .._armrs import DesignedMovement as DesignedMovement
 from .._armrs import Forecast as Forecast
@@ -51,11 +51,11 @@ class Instruments:
     tolerance: Tolerance = field(default_factory=Tolerance)
 
     def __post_init__(self) -> None:
-        validation.number("rate", self.rate, above=0.0, most=10_000.0, unit="Hz")
-        validation.number("cutoff", self.cutoff, above=0.0, most=0.4 * self.rate, unit="Hz")
-        validation.number("force", self.force, above=0.0, most=1e3, unit="N")
-        validation.number("angle", self.angle, above=0.0, most=1.0, unit="rad", hint="degrees?")
-        validation.instance("tolerance", self.tolerance, Tolerance)
+        checks.number("rate", self.rate, above=0.0, most=10_000.0, unit="Hz")
+        checks.number("cutoff", self.cutoff, above=0.0, most=0.4 * self.rate, unit="Hz")
+        checks.number("force", self.force, above=0.0, most=1e3, unit="N")
+        checks.number("angle", self.angle, above=0.0, most=1.0, unit="rad", hint="degrees?")
+        checks.instance("tolerance", self.tolerance, Tolerance)
 
 
 LEAST_TURN = np.radians(1.0)
@@ -96,17 +96,17 @@ class Limits:
         angles = []
         for j, ends in enumerate(self.angles, start=1):
             place = f"angles of joint {j}"
-            low, high = validation.pair(place, ends, least=-4 * np.pi, most=4 * np.pi, unit="rad", hint="looks like degrees")
+            low, high = checks.pair(place, ends, least=-4 * np.pi, most=4 * np.pi, unit="rad", hint="looks like degrees")
             if not low < high:
                 raise BadInput(place, Text(f"{low:g} to {high:g} rad"), "the smaller angle first")
             angles.append((low, high))
         object.__setattr__(self, "angles", tuple(angles))
-        validation.number("speed", self.speed, above=0.0, most=100.0, unit="rad/s")
-        validation.number("acceleration", self.acceleration, above=0.0, most=1e4, unit="rad/s²")
-        validation.number("robot_speed", self.robot_speed, above=0.0, most=100.0, unit="rad/s")
-        validation.number("robot_acceleration", self.robot_acceleration, above=0.0, most=1e4, unit="rad/s²")
-        validation.number("force", self.force, above=0.0, most=1e4, unit="N")
-        validation.number("duration", self.duration, above=0.0, most=600.0, unit="s")
+        checks.number("speed", self.speed, above=0.0, most=100.0, unit="rad/s")
+        checks.number("acceleration", self.acceleration, above=0.0, most=1e4, unit="rad/s²")
+        checks.number("robot_speed", self.robot_speed, above=0.0, most=100.0, unit="rad/s")
+        checks.number("robot_acceleration", self.robot_acceleration, above=0.0, most=1e4, unit="rad/s²")
+        checks.number("force", self.force, above=0.0, most=1e4, unit="N")
+        checks.number("duration", self.duration, above=0.0, most=600.0, unit="s")
         # A movement is simulated before its duration is checked, which must not be endless.
         for name, unit, least in (
             ("speed", "rad/s", LEAST_TURN / self.duration),
@@ -264,7 +264,7 @@ def forecast(
     torque = 0.139 ± 0.0067 N m
     """
     asked = _Question(model, with_effects, instruments, repeats)
-    movements = validation.instances("movements", movements, Movement)
+    movements = checks.instances("movements", movements, Movement)
     if not movements:
         raise BadInput("movements", Text("none"), "at least one")
     for movement in movements:
@@ -324,19 +324,19 @@ def plan(
         When the movements that respect the limits cannot distinguish the parameters.
     """
     asked = _Question(model, with_effects, instruments, repeats)
-    validation.instance("limits", limits, Limits)
+    checks.instance("limits", limits, Limits)
     n = model.n_joints
     if len(limits.angles) != n:
         raise BadInput("angles", Text(f"{len(limits.angles)} ranges"), f"{n}, one a joint")
-    shares = validation.numbers("speeds", speeds, shape=(None,)).tolist()
+    shares = checks.numbers("speeds", speeds, shape=(None,)).tolist()
     if not shares:
         raise BadInput("speeds", Text("none"), "at least one share")
     search: _armrs._Search = {
-        "speeds": [validation.number("speeds", v, above=0.0, most=1.0) for v in shares],
-        "waypoints": validation.whole("waypoints", waypoints, least=2, most=100),
+        "speeds": [checks.number("speeds", v, above=0.0, most=1.0) for v in shares],
+        "waypoints": checks.whole("waypoints", waypoints, least=2, most=100),
         "repeats": repeats,
-        "evaluations": validation.whole("evaluations", evaluations, least=1, most=100_000),
-        "seed": validation.whole("seed", seed, least=0, most=2**64 - 1),
+        "evaluations": checks.whole("evaluations", evaluations, least=1, most=100_000),
+        "seed": checks.whole("seed", seed, least=0, most=2**64 - 1),
     }
     design = interruptible.call(_armrs.design, asked.rig, asked.settings, instruments, limits, search)
     found = tuple(Movement(np.array(m.waypoints), speed=m.speed, acceleration=m.acceleration, shape="smooth") for m in design.movements)
@@ -388,9 +388,9 @@ class _Question:
     """Input of forecast and plan for the core."""
 
     def __init__(self, model: Model, with_effects: Sequence[str] | None, instruments: Instruments, repeats: int) -> None:
-        validation.instance("model", model, Model)
-        validation.instance("instruments", instruments, Instruments)
-        self.model, self.repeats = model, validation.whole("repeats", repeats, least=1, most=10_000)
+        checks.instance("model", model, Model)
+        checks.instance("instruments", instruments, Instruments)
+        self.model, self.repeats = model, checks.whole("repeats", repeats, least=1, most=10_000)
         self.effects, fitted = effects_of(model, with_effects)
         self.rig = _armrs.Rig(model, self.effects)
         self.settings = CoreSettings(model, fitted, instruments.tolerance)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .. import validation
+from .. import checks
 from .._armrs import Prediction
 from ..analysis.stretch_reflex import UNITS, Stretch, spread
 from ..errors import BadInput, Text
@@ -56,11 +56,11 @@ def plan_stretches(
     BadInput
         For a range or limits that leave no two speeds, and a movement that the robot cannot make.
     """
-    validation.instance("model", model, Model)
-    validation.instance("limits", limits, Limits)
+    checks.instance("model", model, Model)
+    checks.instance("limits", limits, Limits)
     instruments = instruments or Instruments()
-    joint = validation.whole("joint", joint, least=1, most=model.n_joints)
-    speeds, repeats = validation.whole("speeds", speeds, least=2, most=20), validation.whole("repeats", repeats, least=2, most=100)
+    joint = checks.whole("joint", joint, least=1, most=model.n_joints)
+    speeds, repeats = checks.whole("speeds", speeds, least=2, most=20), checks.whole("repeats", repeats, least=2, most=100)
     if len(limits.angles) != model.n_joints:
         raise BadInput("angles", Text(f"{len(limits.angles)} ranges"), f"{model.n_joints}, one a joint")
     low, high = limits.angles[joint - 1]

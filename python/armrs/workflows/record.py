@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import ArmrsError, BadInput, Sentence, Text
 from ..io import files
@@ -121,7 +121,7 @@ def record(
     ArmrsError
         When the supervisor stopped every trial to be fitted.
     """
-    experiment = validation.loaded("experiment", experiment, Experiment, load_experiment)
+    experiment = checks.loaded("experiment", experiment, Experiment, load_experiment)
     out = files.output_folder(folder)
     former = _former(out)
     check_required(experiment)

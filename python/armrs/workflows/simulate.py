@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from .._armrs import Readings as Readings
 from .._armrs import Recording as Recording
 from ..errors import BadInput, SimulationError, Text
@@ -64,11 +64,11 @@ class Channel:
     bits: int | None = None
 
     def __post_init__(self) -> None:
-        validation.number("deviation", self.deviation, least=0.0)
-        validation.number("correlation_time", self.correlation_time, least=0.0, unit="s")
-        validation.extent("range", self.range, above=0.0)
+        checks.number("deviation", self.deviation, least=0.0)
+        checks.number("correlation_time", self.correlation_time, least=0.0, unit="s")
+        checks.extent("range", self.range, above=0.0)
         if self.bits is not None:
-            validation.bits("bits", self.bits)
+            checks.bits("bits", self.bits)
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,9 @@ class Sensors:
     torque: Channel = Channel()
 
     def __post_init__(self) -> None:
-        validation.number("rate", self.rate, least=SLOWEST, unit="Hz")
+        checks.number("rate", self.rate, least=SLOWEST, unit="Hz")
         for kind in _CHANNELS:
-            validation.instance(kind, getattr(self, kind), Channel)
+            checks.instance(kind, getattr(self, kind), Channel)
 
     @classmethod
     def realistic(cls) -> Sensors:
@@ -340,10 +340,10 @@ def simulate(
     SimulationError
         When the run stops early.
     """
-    validation.instance("sensors", sensors, Sensors, type(None))
+    checks.instance("sensors", sensors, Sensors, type(None))
     if rate is None:
         rate = DEFAULT_RATE if sensors is None else max(DEFAULT_RATE, sensors.rate)
-    model = sticking(validation.loaded("model", model, Model, load_model))
+    model = sticking(checks.loaded("model", model, Model, load_model))
     _check_accuracy(accuracy, dt, engine, integrator)
 
     def run(step: float) -> Simulated:
@@ -352,7 +352,7 @@ def simulate(
         return _run(prepared, accuracy, _seeded(sensors, seeds, rate))
 
     if accuracy is not None:
-        return run(1.0 / validation.number("rate", rate, least=SLOWEST, unit="Hz"))
+        return run(1.0 / checks.number("rate", rate, least=SLOWEST, unit="Hz"))
     *shorter, last = steps_to_try(model, engine=engine, integrator=integrator, dt=dt)
     for step in shorter:
         with contextlib.suppress(SimulationError):  # a step that is too long may end the run
@@ -419,7 +419,7 @@ def resolve(
         As `simulate`.
     """
     _check_accuracy(accuracy, dt, engine, integrator)
-    step = 1.0 / validation.number("rate", rate, least=SLOWEST, unit="Hz")
+    step = 1.0 / checks.number("rate", rate, least=SLOWEST, unit="Hz")
     prepared = _prepared(model, drive, engine=engine, integrator=integrator, dt=step, rate=rate, start=(None, None), **options)
     with prepared.about_drive():
         chosen, error = _armrs.resolve(_armrs.Rig(model), prepared.led, prepared.core, accuracy)
@@ -435,7 +435,7 @@ def _check_accuracy(accuracy: float | None, dt: float | None, engine: str, integ
     """Refuse an accuracy beside a step, or of what has none."""
     if accuracy is None:
         return
-    validation.number("accuracy", accuracy, above=0.0, unit="rad")
+    checks.number("accuracy", accuracy, above=0.0, unit="rad")
     if dt is not None:
         raise BadInput("dt, accuracy", Text("both"), "one of them: the step is found for the accuracy")
     if engine == "rapier":
@@ -480,13 +480,13 @@ def _prepared(
     coupling: str,
     start: tuple[np.ndarray | None, np.ndarray | None],
 ) -> _PreparedRun:
-    model = validation.loaded("model", model, Model, load_model)
-    validation.choice("coupling", coupling, ("compliant", "rigid"))
-    validation.choice("engine", engine, ("native", "rapier"))
+    model = checks.loaded("model", model, Model, load_model)
+    checks.choice("coupling", coupling, ("compliant", "rigid"))
+    checks.choice("engine", engine, ("native", "rapier"))
     integrator = _integrator(integrator, engine)
-    validation.instance("drive", drive, Movement, Trial, type(None))
-    validation.number("dt", dt, above=0.0, unit="s")
-    validation.number("rate", rate, least=SLOWEST, unit="Hz")
+    checks.instance("drive", drive, Movement, Trial, type(None))
+    checks.number("dt", dt, above=0.0, unit="s")
+    checks.number("rate", rate, least=SLOWEST, unit="Hz")
     steps = 1.0 / max(rate * dt, 1e-18)  # a step next to zero is refused with the length of the run
     if steps < 1.0 - 1e-6:
         raise BadInput("dt, rate", _clock(dt, rate), "at least one step from sample to sample")
@@ -512,7 +512,7 @@ def _prepared(
         duration=duration,
         output_interval=1.0 / rate,
         q=None if angles is None else _start(angles),
-        qd=None if speeds is None else validation.numbers("start_speed", speeds, "rad/s").reshape(-1).tolist(),
+        qd=None if speeds is None else checks.numbers("start_speed", speeds, "rad/s").reshape(-1).tolist(),
     )
     settings = {
         "engine": engine,
@@ -530,7 +530,7 @@ def _integrator(given: str | None, engine: str) -> str:
         return "rk4"
     if engine == "rapier":
         raise BadInput("integrator", given, "none beside the engine rapier, which has its own")
-    return validation.choice("integrator", given, ("rk4", "euler"))
+    return checks.choice("integrator", given, ("rk4", "euler"))
 
 
 def _clock(dt: float, rate: float) -> Text:
@@ -539,15 +539,15 @@ def _clock(dt: float, rate: float) -> Text:
 
 
 def _start(angles: np.ndarray) -> list[float]:
-    found = validation.numbers("start", angles, "rad").reshape(-1)
+    found = checks.numbers("start", angles, "rad").reshape(-1)
     for k, angle in enumerate(found):
-        validation.number(f"start[{k}]", float(angle), least=-_MOST_START, most=_MOST_START, unit="rad")
+        checks.number(f"start[{k}]", float(angle), least=-_MOST_START, most=_MOST_START, unit="rad")
     return found.tolist()
 
 
 def _check_duration(duration: float, dt: float, rate: float) -> None:
     """Refuse a length of a run that is no whole number of steps, or holds no sample interval."""
-    validation.number("duration", duration, above=0.0, unit="s")
+    checks.number("duration", duration, above=0.0, unit="s")
     if not 1.0 / rate <= duration < _MOST_STEPS * dt:
         raise BadInput("duration", duration, f"{1.0 / rate:g} s (one interval between samples) to {_MOST_STEPS * dt:g} s")
     steps = duration / dt
@@ -557,10 +557,10 @@ def _check_duration(duration: float, dt: float, rate: float) -> None:
 
 def _seeded(sensors: Sensors | None, seeds: Sequence[int], rate: float) -> tuple[Sensors, list[int]] | None:
     """Return sensors with their seeds; what would silently have no effect is refused."""
-    validation.instance("seeds", seeds, list, tuple, range, np.ndarray)
+    checks.instance("seeds", seeds, list, tuple, range, np.ndarray)
     if len(seeds) > _MOST_SEEDS:
         raise BadInput("seeds", Text(f"{len(seeds)} of them"), f"at most {_MOST_SEEDS}")
-    read = [validation.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
+    read = [checks.whole(f"seeds[{k}]", seed, least=0, most=2**64 - 1) for k, seed in enumerate(seeds)]
     if sensors is None:
         if read:
             raise BadInput("seeds", read, "none without sensors: they are the seeds of what sensors read")

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .. import _armrs, validation
+from .. import _armrs, checks
 from ..analysis import stretch_reflex
 from ..analysis.motion_direction import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
@@ -208,12 +208,12 @@ def spasticity(
     >>> armrs.spasticity("patient")  # doctest: +SKIP
     Spasticity('patient'; joint 1: gain 0.8 ± 0.02 N m s/rad, threshold 0.6 ± 0.01 rad/s, latency 0.04 ± 0.001 s)
     """
-    dataset = validation.loaded("dataset", dataset, Dataset, load_dataset)
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     slowest = min(trial.rate for trial in dataset.trials)
-    cutoff = validation.number("cutoff", cutoff, above=0.0, unit="Hz")
+    cutoff = checks.number("cutoff", cutoff, above=0.0, unit="Hz")
     # A slow recording is not refused for a default: the cutoff is lowered.
     cutoff = min(cutoff, 0.4 * slowest)
-    tell = validation.progress(progress)
+    tell = checks.progress(progress)
     refuse_implausible(dataset)
     # Samples with muscle activity count here.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ... import validation
+from ... import checks
 from ...errors import ArmrsWarning, BadInput, Text
 from ...model import Model, load_model
 from .. import files
@@ -66,7 +66,7 @@ def export_model(model: Model | str | os.PathLike[str], path: str | os.PathLike[
     >>> armrs.export_model(model, tempfile.gettempdir() + "/arm.urdf").lost
     ('joint 1: stiffness 1 N m/rad about 0 rad', 'gravity: set by the program that reads the file')
     """
-    target = validation.path("path", path)
+    target = checks.path("path", path)
     loaded = model if isinstance(model, Model) else load_model(model)
     write = _WRITERS.get(target.suffix.lower())
     if write is None:
@@ -103,7 +103,7 @@ def import_model(path: str | os.PathLike[str]) -> Model:
 
 def read_model(path: str | os.PathLike[str]) -> Imported:
     """Return what `import_model` does, with remarks for its user."""
-    source = validation.path("path", path)
+    source = checks.path("path", path)
     read = _READERS.get(source.suffix.lower())
     if read is None:
         raise BadInput("path", Text(f"suffix {source.suffix!r}"), f"one of {', '.join(_READERS)} (MJCF is .xml)", file=path)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ... import _armrs, validation
+from ... import _armrs, checks
 from ...catalogue import catalogue
 from ...errors import BadInput
 from ...io.dataset import Dataset, refuse_other_arms
@@ -67,5 +67,5 @@ def core_settings(dataset: Dataset, led: bool, threads: int | None, own: Sequenc
         led=led,
         weights=[weights.get(t.configuration, 1.0) for t in dataset.trials],
         own=list(own),
-        threads=validation.threads(threads),
+        threads=checks.threads(threads),
     )

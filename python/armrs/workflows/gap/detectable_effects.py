@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ... import _armrs, interruptible, validation
+from ... import _armrs, checks, interruptible
 from ..._armrs import Limit
 from ...catalogue import catalogue
 from ...errors import BadInput, Text
@@ -53,12 +53,12 @@ def detectable(
     The session is simulated with white noise of the sensors and nothing hidden in it, calibrated, and every candidate is tested to first
     order, as on measured data. Tone, slips and whatever else differs between trials of a living arm make the limits larger.
     """
-    validation.instance("model", model, Model)
-    validation.instance("instruments", instruments, Instruments, type(None))
+    checks.instance("model", model, Model)
+    checks.instance("instruments", instruments, Instruments, type(None))
     instruments = instruments or Instruments()
-    movements = validation.instances("movements", movements, Movement)
-    validation.whole("repeats", repeats, least=2)
-    validation.whole("seed", seed, least=0, most=2**32)
+    movements = checks.instances("movements", movements, Movement)
+    checks.whole("repeats", repeats, least=2)
+    checks.whole("seed", seed, least=0, most=2**32)
     if model.robot is None:
         raise BadInput("[robot]", Text("none"), "a robot: what a session shows depends on how the arm is led")
     sensors = Sensors(rate=instruments.rate, angle=Channel(instruments.angle), force=Channel(instruments.force))

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Callable, Sequence
 
-from ... import _armrs, interruptible, validation
+from ... import _armrs, checks, interruptible
 from ...custom_effects import OwnEffect
 from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
@@ -64,12 +64,12 @@ def find_gap(
     >>> armrs.find_gap("session").verdict  # doctest: +SKIP
     'explained'
     """
-    dataset = validation.loaded("dataset", dataset, Dataset, load_dataset)
+    dataset = checks.loaded("dataset", dataset, Dataset, load_dataset)
     dataset = dataset.replace(trials=comparable(dataset.trials))
-    validation.flag("separate", separate)
+    checks.flag("separate", separate)
     if progress is not None:
-        validation.function("progress", progress)
-    effects = validation.instances("effects", effects, OwnEffect)
+        checks.function("progress", progress)
+    effects = checks.instances("effects", effects, OwnEffect)
     own = [e.kind for e in effects]
     try:
         result = _searched(dataset, own, threads, progress)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ... import _armrs, interruptible, validation, view_registry
+from ... import _armrs, checks, interruptible, view_registry
 from ..._armrs import Absorbed, ChannelGap, Place, Suspect
 from ...custom_effects import OwnEffect
 from ...io.dataset import Dataset, load_dataset, naming_trials
@@ -205,7 +205,7 @@ def confirm(result: GapFound, dataset: Source | None = None) -> Mapping[str, Cha
 
 
 def _loaded(dataset: Source, model: Model | None) -> Dataset:
-    data = validation.loaded("dataset", dataset, Dataset, load_dataset)
-    validation.instance("model", model, Model, type(None))
+    data = checks.loaded("dataset", dataset, Dataset, load_dataset)
+    checks.instance("model", model, Model, type(None))
     data = data.replace(trials=comparable(data.trials))
     return data if model is None else data.replace(model=model)

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ... import validation
+from ... import checks
 from ...errors import BadInput, Text, unknown_name
 from ...io.raw import RawColumn, RawTable
 from ...io.raw.units import UNITS, unit
@@ -186,7 +186,7 @@ def parse_map(text: str) -> dict[str, tuple[str, int]]:
     BadInput
         For a part that is not `SYMBOL=COLUMN`.
     """
-    validation.instance("columns_map", text, str)
+    checks.instance("columns_map", text, str)
     found: dict[str, tuple[str, int]] = {}
     for part in re.split(r",(?=\s*(?:t|q\d|qr\d|dq\d|tau\d|F[yz]|P[yz]|Mx|emg_\w+)\s*=)", text):
         if not part.strip():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ... import validation
+from ... import checks
 from ...errors import BadInput
 from ...io import tomlfile
 
@@ -173,22 +173,22 @@ def load_recipe(path: Path) -> Recipe:
 
 
 def _recipe(document: Mapping[str, Any]) -> Recipe:
-    validation.keys("", document, required=["convention", "channel", "trial"], optional=[])
-    angles = validation.table("[convention]", document["convention"])
-    validation.keys(
+    checks.keys("", document, required=["convention", "channel", "trial"], optional=[])
+    angles = checks.table("[convention]", document["convention"])
+    checks.keys(
         "[convention]", angles, required=["reference", "zero", "signs"], optional=["force_on", "points", "handle_origin", "rate_Hz"]
     )
     convention = Convention(
-        validation.choice("[convention], reference", angles["reference"], REFERENCES),
-        validation.choice("[convention], zero", angles["zero"], ZEROS),
+        checks.choice("[convention], reference", angles["reference"], REFERENCES),
+        checks.choice("[convention], zero", angles["zero"], ZEROS),
         tuple(_sign("[convention], signs", sign) for sign in angles["signs"]),
-        None if "force_on" not in angles else validation.choice("[convention], force_on", angles["force_on"], ("robot", "arm")),
+        None if "force_on" not in angles else checks.choice("[convention], force_on", angles["force_on"], ("robot", "arm")),
     )
-    channels = tuple(_channel(f"[[channel]] {k}", table) for k, table in enumerate(validation.tables("channel", document["channel"]), 1))
-    trials = tuple(_trial(f"[[trial]] {k}", table) for k, table in enumerate(validation.tables("trial", document["trial"]), 1))
-    points = tuple(validation.instances("[convention], points", angles.get("points", []), str))
+    channels = tuple(_channel(f"[[channel]] {k}", table) for k, table in enumerate(checks.tables("channel", document["channel"]), 1))
+    trials = tuple(_trial(f"[[trial]] {k}", table) for k, table in enumerate(checks.tables("trial", document["trial"]), 1))
+    points = tuple(checks.instances("[convention], points", angles.get("points", []), str))
     rate = angles.get("rate_Hz")
-    rate = None if rate is None else validation.number("[convention], rate_Hz", rate, above=0.0, most=1e6, unit="Hz")
+    rate = None if rate is None else checks.number("[convention], rate_Hz", rate, above=0.0, most=1e6, unit="Hz")
     return Recipe(channels, convention, trials, points, _origin(angles.get("handle_origin")), rate)
 
 
@@ -198,7 +198,7 @@ def _origin(value: object) -> tuple[float, float] | None:
         return None
     if not isinstance(value, list) or len(value) != 2:
         raise BadInput(place, value, "two numbers, forward and upward [m]")
-    return validation.number(place, value[0], unit="m"), validation.number(place, value[1], unit="m")
+    return checks.number(place, value[0], unit="m"), checks.number(place, value[1], unit="m")
 
 
 def _sign(place: str, value: object) -> int:
@@ -208,27 +208,27 @@ def _sign(place: str, value: object) -> int:
 
 
 def _channel(place: str, table: Mapping[str, Any]) -> Channel:
-    validation.keys(place, table, required=["symbol", "column", "unit"], optional=["sign", "lowest"])
+    checks.keys(place, table, required=["symbol", "column", "unit"], optional=["sign", "lowest"])
     text = {key: table[key] for key in ("symbol", "column", "unit")}
     for key, value in text.items():
-        validation.instance(f"{place}, {key}", value, str)
-    lowest = None if "lowest" not in table else validation.number(f"{place}, lowest", table["lowest"], unit=text["unit"])
+        checks.instance(f"{place}, {key}", value, str)
+    lowest = None if "lowest" not in table else checks.number(f"{place}, lowest", table["lowest"], unit=text["unit"])
     return Channel(**text, sign=_sign(f"{place}, sign", table.get("sign", 1)), lowest=lowest)
 
 
 def _trial(place: str, table: Mapping[str, Any]) -> RawTrial:
     optional = ["force_file", "force_shift", "force_table", "remarks"]
-    validation.keys(place, table, required=["file", "table", "configuration", "repeat", "role"], optional=optional)
+    checks.keys(place, table, required=["file", "table", "configuration", "repeat", "role"], optional=optional)
     for key in ("file", "table", "configuration"):
-        validation.text(f"{place}, {key}", table[key])
+        checks.text(f"{place}, {key}", table[key])
     return RawTrial(
         table["file"],
         table["table"],
         table["configuration"],
-        validation.whole(f"{place}, repeat", table["repeat"], least=1),
-        validation.choice(f"{place}, role", table["role"], ("fit", "test")),
+        checks.whole(f"{place}, repeat", table["repeat"], least=1),
+        checks.choice(f"{place}, role", table["role"], ("fit", "test")),
         table.get("force_file"),
-        validation.number(f"{place}, force_shift", table.get("force_shift", 0.0), unit="s"),
+        checks.number(f"{place}, force_shift", table.get("force_shift", 0.0), unit="s"),
         table.get("force_table"),
-        tuple(validation.instances(f"{place}, remarks", table.get("remarks", []), str)),
+        tuple(checks.instances(f"{place}, remarks", table.get("remarks", []), str)),
     )

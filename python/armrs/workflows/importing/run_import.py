@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ... import validation
+from ... import checks
 from ...errors import BadInput, BadInputs, Sentence, Text, unknown_name
 from ...io import files
 from ...io.dataset import load_dataset
@@ -134,14 +134,14 @@ def import_recordings(
     BadInput
         With every problem that was found (`BadInputs.problems`); nothing is written then.
     """
-    validation.instance("sources", sources, list, tuple)
-    paths = [validation.path("sources", source) for source in sources]
-    points = validation.instances("points", points, str)
-    rate = None if rate is None else validation.number("rate", rate, above=0.0, most=1e6, unit="Hz")
+    checks.instance("sources", sources, list, tuple)
+    paths = [checks.path("sources", source) for source in sources]
+    points = checks.instances("points", points, str)
+    rate = None if rate is None else checks.number("rate", rate, above=0.0, most=1e6, unit="Hz")
     if not paths:
         raise BadInput("sources", Text("nothing"), "one recording or more")
-    former = _former(files.output_folder(out), validation.flag("replace", replace))
-    tell = validation.progress(progress)
+    former = _former(files.output_folder(out), checks.flag("replace", replace))
+    tell = checks.progress(progress)
     if isinstance(model, Model):
         loaded, about = model, (Subject(), Tolerance())
     else:
@@ -170,7 +170,7 @@ def model_file(sources: Sequence[str | os.PathLike[str]], model: str | os.PathLi
     paths = [Path(source) for source in sources]
     if model is None and not _is_recipe(paths):
         raise BadInput("model", Text("nothing"), "--model with the model.toml of the arm, as armrs init writes it")
-    return paths[0].parent / "model.toml" if model is None else validation.path("model", model, Model)
+    return paths[0].parent / "model.toml" if model is None else checks.path("model", model, Model)
 
 
 def _about(model: Path) -> tuple[Subject, Tolerance]:
@@ -207,15 +207,15 @@ def _led(model: Model, recipe: Recipe, reads: Sequence[LoadedTrial]) -> tuple[Mo
 def _given(angles: str | None, zero: str | None, clockwise: Sequence[int] | None, force_on: str | None, n_joints: int) -> dict[str, object]:
     given: dict[str, object] = {}
     if angles is not None:
-        given["reference"] = validation.choice("angles", angles, ("relative", "absolute"))
+        given["reference"] = checks.choice("angles", angles, ("relative", "absolute"))
     if zero is not None:
-        given["zero"] = validation.choice("zero", zero, ("horizontal", "hanging"))
+        given["zero"] = checks.choice("zero", zero, ("horizontal", "hanging"))
     if clockwise is not None:
-        validation.instance("clockwise", clockwise, list, tuple)
-        numbers = [validation.whole("clockwise", j, least=1, most=n_joints) for j in clockwise]
+        checks.instance("clockwise", clockwise, list, tuple)
+        numbers = [checks.whole("clockwise", j, least=1, most=n_joints) for j in clockwise]
         given["signs"] = tuple(-1 if j in numbers else 1 for j in range(1, n_joints + 1))
     if force_on is not None:
-        given["force_on"] = validation.choice("force_on", force_on, ("robot", "arm"))
+        given["force_on"] = checks.choice("force_on", force_on, ("robot", "arm"))
     return given
 
 
