@@ -46,7 +46,7 @@ def made(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
         ["workflows.record", "record", "record", str(out / "EXPERIMENT.toml")],
         ["workflows.plan", "plan", "plan", truth, "--angles-deg=-80:-20,30:90", "--evaluations", "20"],
         ["montecarlo", "sweep", "sweep", str(out / "SWEEP.toml"), "--jobs", "1"],
-        ["cosim.accuracy", "run_checked", "fmu", "run", str(out / "cosim" / "wall.toml")],
+        ["cosim.error_estimate", "run_checked", "fmu", "run", str(out / "cosim" / "wall.toml")],
     ):
         place = ["-o", str(out / arguments[0])]
         status, returned = results.behind(importlib.import_module(f"armrs.{module}"), function, *arguments, *place)

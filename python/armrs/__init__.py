@@ -1,4 +1,4 @@
-"""armrs: what is an arm made of, when a robot leads it.
+"""armrs: identify a passive planar arm that a robot guides by the hand, and find which effects its model lacks.
 
 Everything is loaded on first use, so that `import armrs` costs next to nothing.
 """

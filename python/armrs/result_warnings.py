@@ -1,4 +1,4 @@
-"""Warnings of results through `warnings`, as scripts and notebooks expect them."""
+"""Warnings of results, issued through the module `warnings`."""
 
 from __future__ import annotations
 

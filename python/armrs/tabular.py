@@ -1,4 +1,4 @@
-"""Results as tables and pictures: in a notebook, as a data frame, as labelled arrays, as JSON, as a report."""
+"""Base classes of results: data frames, labelled arrays, JSON, display in notebooks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which module draws each result: named here, loaded when something is drawn.
+"""Which module draws each result. The module is loaded only when something is drawn.
 
 Modules that compute import nothing that draws, and starting takes no time for figures that are not needed.
 """

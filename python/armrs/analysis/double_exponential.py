@@ -1,4 +1,4 @@
-"""The elastic moment of a joint as two exponentials and a slope, whose limits may move with the adjacent angle.
+"""The elastic moment of a joint as two exponentials and a slope; the limits of the range may shift with the adjacent angle.
 
 `f = upper·exp(k_u (q + r_u a − q_hi)) − lower·exp(−k_l (q + r_l a − q_lo)) + stiffness·(q − q_mid)`, a the adjacent angle from its mean.
 The exponentials are those of Riener and Edrich 1999, in whose exponents the adjacent angle stands; with both ratios zero they are those of

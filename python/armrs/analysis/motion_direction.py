@@ -1,4 +1,4 @@
-"""In which direction joints move, sample by sample."""
+"""The direction of motion of each joint at each sample."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values in a model of the quantities that a result names: `m1*l1 + a1*m2` is 0.7012 kg m."""
+"""Values of expressions of model parameters such as `m1*l1 + a1*m2`, the names of quantities in results."""
 
 from __future__ import annotations
 

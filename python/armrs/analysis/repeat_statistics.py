@@ -1,4 +1,4 @@
-"""Means over repeats of one movement, NaN where a repeat has no samples."""
+"""Mean and standard deviation over repeats of one movement; NaN where a repeat has no samples."""
 
 from __future__ import annotations
 

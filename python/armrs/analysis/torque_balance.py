@@ -1,4 +1,4 @@
-"""Balance of the torques of the contact with gravity, inertia and passive joint laws near those of a model.
+"""Least-squares balance of the contact torques with gravity, inertia and passive joint laws, near the values of a model.
 
 The wrong convention of angles or forces leaves most of the torques unexplained, whatever springs, dampers and friction the joints have.
 """

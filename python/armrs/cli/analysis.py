@@ -1,4 +1,4 @@
-"""Verbs that say what a data set tells of its arm."""
+"""The verbs `identify`, `gap` and `passive`."""
 
 from __future__ import annotations
 

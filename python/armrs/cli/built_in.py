@@ -1,4 +1,4 @@
-"""Verbs that need no data: the main job on a simulated session, and the thesis."""
+"""The verbs `demo` and `reproduce`, which need no data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verbs of a clinic: reflexes by speed, and cohorts."""
+"""The verbs `spasticity` and `cohort`."""
 
 from __future__ import annotations
 

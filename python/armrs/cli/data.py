@@ -1,4 +1,4 @@
-"""Verbs that compute nothing of an arm: the catalogue, conversions, reports."""
+"""The verbs `effects`, `convert` and `report`."""
 
 from __future__ import annotations
 

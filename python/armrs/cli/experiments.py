@@ -1,4 +1,4 @@
-"""Verbs that make data: experiments simulated, planned, recorded, and many of them."""
+"""The verbs `simulate`, `plan`, `record` and `sweep`."""
 
 from __future__ import annotations
 

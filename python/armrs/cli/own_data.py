@@ -1,4 +1,4 @@
-"""Verbs for own data: a first data set of a person, recordings into a data set, every problem of a data set."""
+"""The verbs `init`, `import` and `check`."""
 
 from __future__ import annotations
 

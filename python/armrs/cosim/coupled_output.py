@@ -1,4 +1,4 @@
-"""A run of a system as plain data, and as files: JSON, figures, a report, and the samples of a run that is a result."""
+"""A coupled run as plain data and as files: JSON, samples, figures, report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a coupled run came to."""
+"""The result of a coupled run."""
 
 from __future__ import annotations
 

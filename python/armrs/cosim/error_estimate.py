@@ -1,4 +1,4 @@
-"""A coupled run with an estimate of its error: the run is made again with half the step, and the two are compared."""
+"""A coupled run with an estimate of its error: the run is repeated with half the step, and both are compared."""
 
 from __future__ import annotations
 

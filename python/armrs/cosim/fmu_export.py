@@ -1,4 +1,4 @@
-"""Packing an arm as an FMU: description, library, documentation and the arm itself. The same arm gives the same bytes."""
+"""Export of an arm as an FMU: description, library, documentation and the arm itself. The same arm gives the same bytes."""
 
 from __future__ import annotations
 

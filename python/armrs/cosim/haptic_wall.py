@@ -1,4 +1,4 @@
-"""A haptic wall: the simplest partner. It has no state; what it gives follows from what it is given."""
+"""A haptic wall: a stateless slave whose force follows from position and velocity."""
 
 from __future__ import annotations
 

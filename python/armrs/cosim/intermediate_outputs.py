@@ -1,4 +1,4 @@
-"""What outputs do between the communication points: a slave makes a step in parts, and its outputs are read after each of them."""
+"""Outputs between the communication points: a slave divides a step into parts, and its outputs are read after each of them."""
 
 from __future__ import annotations
 

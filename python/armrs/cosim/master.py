@@ -1,4 +1,4 @@
-"""The master: steps the slaves of a system together, and estimates the error of the result."""
+"""The master algorithm: steps the slaves of a system together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The arm as a co-simulation slave in Python: the same table, rules and bits as the FMU."""
+"""The arm as a co-simulation slave in Python, with the variables, rules and bits of the FMU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Partners that are ready to use: signals of time, a PID controller, an impedance."""
+"""Built-in slaves: signals over time, a PID controller, an impedance controller."""
 
 from __future__ import annotations
 

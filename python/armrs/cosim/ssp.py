@@ -1,4 +1,4 @@
-"""Systems in the files of SSP 1.0 (System Structure and Parameterization): `.ssp` archives and bare `.ssd` files are read."""
+"""Reader of SSP 1.0 (System Structure and Parameterization): `.ssp` archives and bare `.ssd` files."""
 
 from __future__ import annotations
 

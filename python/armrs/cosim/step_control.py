@@ -1,4 +1,4 @@
-"""Which communication steps a run makes: of one length, at given times, or of lengths that follow from their errors."""
+"""Communication step sizes: constant, given, or controlled by the error."""
 
 from __future__ import annotations
 

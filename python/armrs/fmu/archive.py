@@ -1,4 +1,4 @@
-"""An FMU as an archive: opened, read and unpacked within stated limits, whatever is in it."""
+"""An FMU as an archive: opened, read and unpacked within limits of size and nesting."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules of the standards on the archive of an FMU and on its terminals."""
+"""Rules of the standards for the archive of an FMU and its terminals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The libraries that travel in FMUs: that of this machine, which comes with the wheel, and those of others from a folder."""
+"""The shared libraries that an exported FMU contains: that of this machine, from the wheel, and those of a folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a description promises beyond stepping, tried: derivatives, dependencies, event mode, intermediate update, Model Exchange."""
+"""Tests of declared capabilities beyond stepping: derivatives, dependencies, event mode, Model Exchange."""
 
 from __future__ import annotations
 

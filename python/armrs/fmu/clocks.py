@@ -1,4 +1,4 @@
-"""Clocks of FMI 3.0 (sections 2.2.8 and 2.4): rules on their descriptions, and what a library does with them, tried.
+"""Clocks of FMI 3.0 (sections 2.2.8 and 2.4): rules for their descriptions, and tests of the library.
 
 Clocks tick in the event mode of co-simulation and Model Exchange, and activate the partitions of a model in scheduled execution.
 """

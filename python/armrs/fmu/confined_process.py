@@ -1,4 +1,4 @@
-"""A separate process for foreign code, with a separate pipe: lines of JSON that begin with a secret word."""
+"""A separate process for foreign code. Messages are lines of JSON that begin with a secret word, over a separate pipe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules of the standards on a model description, beyond its schema."""
+"""Rules of the standards for a model description that its schema cannot express."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an FMU of FMI 3.0 does inside of a communication step, tried: intermediate updates and early returns (sections 2.2.10 and 4.2)."""
+"""Tests of intermediate updates and early returns of FMI 3.0 (sections 2.2.10 and 4.2)."""
 
 from __future__ import annotations
 

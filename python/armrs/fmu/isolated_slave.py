@@ -1,4 +1,4 @@
-"""An FMU as a slave in a process of its own, which may crash, hang or end itself without taking anything along."""
+"""An FMU as a slave in a process of its own, so that a crash or hang does not affect this process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The library of an FMU, tried: its behaviour against its description. It runs in a process of its own."""
+"""Tests of the library of an FMU against its description. They run in a process of their own."""
 
 from __future__ import annotations
 

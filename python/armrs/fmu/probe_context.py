@@ -1,4 +1,4 @@
-"""One FMU on trial: what it is tried with, and where findings go."""
+"""The FMU under test: its description, step sizes and values, and the list of findings."""
 
 from __future__ import annotations
 

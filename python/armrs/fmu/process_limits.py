@@ -1,4 +1,4 @@
-"""What a process that runs foreign code may do: memory, files, where it writes, how long it outlives its parent.
+"""Limits of a process that runs foreign code: memory, file size, writable folders, lifetime.
 
 On Linux memory and file sizes are limited, writing is confined to one folder (Landlock, where the kernel has it), and the whole process
 group ends with its parent. On macOS memory and file sizes are limited as far as the system obeys. On Windows nothing of this is limited;

@@ -1,4 +1,4 @@
-"""The shared library of an FMU behind the C interface of FMI 2.0 or 3.0."""
+"""The C interface of FMI 2.0 or 3.0 of the shared library of an FMU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a master needs of everything that it couples: our own slave, an imported FMU, a wall."""
+"""The interface of every slave that a master can couple: status, step result, variable, and the abstract class `Partner`."""
 
 from __future__ import annotations
 

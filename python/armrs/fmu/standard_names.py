@@ -1,4 +1,4 @@
-"""Names that the standards fix: the functions of a library, the attributes of a description."""
+"""Names defined by the standards: functions of a library, attributes of a description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules of the standards on ModelStructure: what is listed, and what it depends on."""
+"""Rules of the standards for ModelStructure: which unknowns are listed, and their dependencies."""
 
 from __future__ import annotations
 

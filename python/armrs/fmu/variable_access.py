@@ -1,4 +1,4 @@
-"""Values of a library on trial: start values, and what can be set and read."""
+"""Tests of variables: start values, and which can be set and read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The program of a process that runs foreign code: it serves one FMU to an `IsolatedSlave`, or tries one for `armrs fmu check`."""
+"""The program of the process that runs foreign code: it serves one FMU to an `IsolatedSlave`, or tests one for `armrs fmu check`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What columns of angles and forces may hold instead of what the model means by them: other conventions, units and orders."""
+"""Alternative meanings of recorded columns: other angle conventions, units, signs and orders, as transformations."""
 
 from __future__ import annotations
 

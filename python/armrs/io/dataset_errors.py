@@ -1,4 +1,4 @@
-"""Every fault of a `dataset.toml` at once: each is put right in a copy, so that the next shows."""
+"""All errors of a `dataset.toml` at once: each is corrected in a copy, so that the next one is found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the joints of a planar chain are."""
+"""Positions of the joints of a planar chain."""
 
 from __future__ import annotations
 

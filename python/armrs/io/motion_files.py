@@ -1,4 +1,4 @@
-"""Files of movements: marker trajectories into trials, OpenSim's MOT and STO in and out."""
+"""Conversion of marker trajectories to trials, and of OpenSim's MOT and STO files in both directions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What no data set can be, whatever the arm is: dead sensors, and angles that contradict those of the robot.
+"""Data that no arm can produce: dead sensors, and angles that contradict those of the robot.
 
 It is checked before any fit, so that a wrong column is named as such and not as a poor fit.
 """

@@ -1,4 +1,4 @@
-"""Files from one format to another, with every column and every value kept to the bit."""
+"""Conversion between file formats; every column and every value is preserved to the bit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One case: draw, simulate, measure, identify. Its rows depend on the sweep and the number of the case alone."""
+"""One case: draw, simulate, measure, identify. Its rows depend only on the sweep and the number of the case."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures of a sweep: what was found against the truth, and how often intervals hold it."""
+"""Figures of a sweep: estimates against true values, and coverage of the intervals."""
 
 from __future__ import annotations
 

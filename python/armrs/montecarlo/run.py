@@ -1,4 +1,4 @@
-"""Running a sweep: what is there already, who computes the rest, and what it all comes to."""
+"""Running a sweep: which cases exist already, which processes compute the others, and the result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sweep in words and tables, for terminal and report alike; everything reads the plain data of `sweep.json`."""
+"""Sentences and tables of a sweep, for terminal and report. They read the plain data of `sweep.json`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`SWEEP.toml`: what is repeated, what varies from case to case, and whether each case is identified."""
+"""`SWEEP.toml`: what is repeated, what varies from case to case, whether each case is identified."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Changing one value somewhere in nested tables or in a model, and drawing what to change it to."""
+"""Drawing random values, and replacing values in nested tables or in a model."""
 
 from __future__ import annotations
 

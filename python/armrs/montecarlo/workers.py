@@ -1,4 +1,4 @@
-"""Who computes the parts of a sweep: this process, processes beside it, or a Dask cluster. All give the same rows."""
+"""Computing the parts of a sweep: in this process, in processes beside it, or on a Dask cluster. All give the same rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The estimator and the compensation of the C interface, sample by sample."""
+"""The estimator and the gravity compensation of the C interface, sample by sample."""
 
 from __future__ import annotations
 

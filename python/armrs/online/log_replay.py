@@ -1,4 +1,4 @@
-"""The log of a device through the estimator: what it would have learned, refused and carried."""
+"""The log of a device processed by the estimator: estimates, refused samples, compensation torques."""
 
 from __future__ import annotations
 

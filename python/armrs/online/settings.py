@@ -1,4 +1,4 @@
-"""How an estimator works: `armrs_settings` of the C interface."""
+"""Settings of the estimator: `armrs_settings` of the C interface."""
 
 from __future__ import annotations
 

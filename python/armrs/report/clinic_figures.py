@@ -1,4 +1,4 @@
-"""Figures and files of results that a clinic reads: reflexes by speed, and cohorts."""
+"""Figures and files of `spasticity` and `cohort`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sentences and tables of results that a clinic reads: reflexes by speed, and cohorts."""
+"""Sentences and tables of `spasticity` and `cohort`."""
 
 from __future__ import annotations
 

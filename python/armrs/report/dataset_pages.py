@@ -1,4 +1,4 @@
-"""Data sets as they were imported, checked or recorded: pages, pictures and sentences."""
+"""Pages, figures and sentences of data sets that were imported, checked or recorded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whole figures of results: which plots stand together, and the words below them."""
+"""Whole figures of results with their captions."""
 
 from __future__ import annotations
 

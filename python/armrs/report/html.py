@@ -1,4 +1,4 @@
-"""HTML from Jinja2 templates: everything is escaped, and a page may load and run nothing but what is in it."""
+"""HTML from Jinja2 templates: everything is escaped, and a page loads and runs only what it contains."""
 
 from __future__ import annotations
 

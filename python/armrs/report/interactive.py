@@ -1,4 +1,4 @@
-"""What moves in a page: the arm and its robot, and series that a reader zooms and switches."""
+"""Animations and zoomable series of a page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Series over time that a reader zooms and switches: plain data, which a few lines of script draw in a page."""
+"""Series over time that a reader can zoom and switch: plain data, and the markup that a script draws."""
 
 from __future__ import annotations
 

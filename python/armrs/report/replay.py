@@ -1,4 +1,4 @@
-"""Figures and report of a device's log that went through the estimator."""
+"""Figures and report of a device log that the estimator has processed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What moves in the pages of runs and recordings: arm and robot, and their series."""
+"""Animations and series of simulated runs and of recordings."""
 
 from __future__ import annotations
 

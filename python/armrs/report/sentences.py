@@ -1,4 +1,4 @@
-"""Results in words: what the terminal prints, and the sentences of reports. Each function reads the plain data of a result."""
+"""Sentences about results, for terminal and reports. Each function reads the plain data of a result."""
 
 from __future__ import annotations
 

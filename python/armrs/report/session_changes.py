@@ -1,4 +1,4 @@
-"""What changed between sessions, in the words of a page for a clinician: how much, and how sure that is."""
+"""Changes between sessions, for the page for a clinician: size and certainty."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stick figures that move: plain data, and how they stand in a page (SVG, moved by a few lines of script)."""
+"""Animated stick figures: plain data, and SVG for a page."""
 
 from __future__ import annotations
 

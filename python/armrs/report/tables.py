@@ -1,4 +1,4 @@
-"""Tables of results: heads and rows, for the terminal and for reports alike. They read the plain data of a result."""
+"""Tables of results, for terminal and reports. They read the plain data of a result."""
 
 from __future__ import annotations
 

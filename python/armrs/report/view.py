@@ -1,4 +1,4 @@
-"""How a result shows itself in Python: the figures of its report, and the report."""
+"""The methods `plot` and `report` of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who moves how: trajectories of section 3.4 and 3.5 and the bodies of equations 3.14 and 3.20."""
+"""Trajectories of sections 3.4 and 3.5, and the bodies of equations 3.14 and 3.20."""
 
 from __future__ import annotations
 

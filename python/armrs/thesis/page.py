@@ -1,4 +1,4 @@
-"""The page: a part of the thesis at a time, every item with what is printed, what we get, and why they differ."""
+"""The page of `armrs reproduce`: every item with the printed value, our value, and why they differ."""
 
 from __future__ import annotations
 

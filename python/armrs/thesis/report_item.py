@@ -1,4 +1,4 @@
-"""What stands in the report: an item of the thesis, and what came out for it."""
+"""The types of the report: an item of the thesis (table or figure), and its recomputed values."""
 
 from __future__ import annotations
 

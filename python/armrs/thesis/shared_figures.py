@@ -1,4 +1,4 @@
-"""Pictures that several items share: arms in the plane, means with their spread over trials, bars beside a reference."""
+"""Figures that several items share: arms in the plane, means with scatter over trials, bars beside a reference."""
 
 from __future__ import annotations
 

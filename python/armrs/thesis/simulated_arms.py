@@ -1,4 +1,4 @@
-"""Who and what is simulated: the mechanical arm, virtual subjects, the robots, and how trials of them are read.
+"""The simulated arms and robots: the mechanical arm, virtual subjects, and how their trials are measured.
 
 The thesis prints no measured samples. Where an item needs some, they come from the closed-chain simulation of these arms, read by the
 sensors of section 3; every number that the thesis does not give is chosen here and marked as chosen.

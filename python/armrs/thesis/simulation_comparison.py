@@ -1,4 +1,4 @@
-"""The simulation of the experiment beside a measurement (section 4.3): tables 4.9 and 4.10, figures 4.37 to 4.41."""
+"""The simulation of the experiment compared with a measurement (section 4.3): tables 4.9 and 4.10, figures 4.37 to 4.41."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What leads an arm, and how a run is computed, as the core takes them."""
+"""Input of the simulation in the core: what drives the arm, and how the run is computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Results of one subject over sessions: a file of SQLite, a test of change, and a plot."""
+"""Results of one subject over sessions: an SQLite file, a test of change, and a plot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Before an experiment: how well movements will show each parameter, and movements that show them well."""
+"""Planning an experiment: how well movements determine each parameter, and movements that determine them well."""
 
 from __future__ import annotations
 

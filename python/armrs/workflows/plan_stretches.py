@@ -1,4 +1,4 @@
-"""Stretches of one joint at several speeds, and how well they will show its reflex."""
+"""Planning stretches of one joint at several speeds, and how well they determine its reflex."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The virtual laboratory (thesis figure 3.8): a subject, a robot with its controller, sensors, clocks, and a supervisor that stops it."""
+"""The virtual laboratory (thesis figure 3.8): a subject, a controlled robot, sensors, clocks, and a supervisor that stops it."""
 
 from __future__ import annotations
 

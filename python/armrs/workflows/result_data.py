@@ -1,4 +1,4 @@
-"""Results as plain data: what a verb writes as JSON, and what reports and words read."""
+"""Results as plain data: the JSON of a verb, which reports read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wrong setups: angles or forces in a convention in which the arm cannot balance, though in another it does."""
+"""Wrong setups: angles or forces for which the arm is in balance only in another convention."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How accurate a simulated run is: by its energy balance, and by comparison with the same run at half the step."""
+"""Accuracy of a simulated run: its energy balance, and comparison with the same run at half the step."""
 
 from __future__ import annotations
 

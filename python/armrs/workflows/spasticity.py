@@ -1,4 +1,4 @@
-"""Spasticity by speed: stretches of one joint, slow to fast, and the reflex that resists the fast ones."""
+"""Stretch reflexes from stretches of one joint at several speeds: `armrs spasticity`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which dry friction of a simulated arm is solved as set-valued because the usual step cannot follow it."""
+"""Dry friction that a simulation solves as set-valued, because the usual step cannot resolve the smooth law."""
 
 from __future__ import annotations
 

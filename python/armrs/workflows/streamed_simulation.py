@@ -1,4 +1,4 @@
-"""Runs of any length in bounded memory: of more than a piece, all pieces are kept on disk until they are drawn and written."""
+"""Simulated runs of any length in bounded memory: pieces are kept on disk until they are drawn and written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings as laboratories have them: any table, workbook or motion file becomes named columns with units."""
+"""Recordings in the formats of laboratories: any table, workbook or motion file becomes named columns with units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers in the cells of a text."""
+"""Numbers and times in the cells of a text table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings that already have names and time: Parquet, OpenSim motion files, markers in TRC, markers and analog channels in C3D files."""
+"""Recordings with names and time: Parquet, OpenSim motion files, markers in TRC, markers and analog channels in C3D files."""
 
 from __future__ import annotations
 

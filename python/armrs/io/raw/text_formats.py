@@ -1,4 +1,4 @@
-"""Text files by the program that wrote them: exports with a layout of their own, and tables of any other program."""
+"""The reader of each text file, by the program that wrote it; tables of other programs go to `text_table`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What moves in the report of the gap workflow: the arm as measured and as simulated, and series with effects to switch off."""
+"""Animation of a gap report: the arm as measured and as simulated, and series with effects to switch on and off."""
 
 from __future__ import annotations
 

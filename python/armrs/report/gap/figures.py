@@ -1,4 +1,4 @@
-"""Figures of the gap workflow: before and after, where they disagree, the evidence, and each effect by itself."""
+"""Figures of the gap workflow: before and after, maps of the missing torque, search trace, each effect alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the gap workflow found, as plain data and as files."""
+"""The result of the gap workflow as plain data and as files."""
 
 from __future__ import annotations
 

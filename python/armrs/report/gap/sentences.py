@@ -1,4 +1,4 @@
-"""The gap workflow in words and tables: for the terminal and for reports alike. They read the plain data of a result."""
+"""Sentences and tables of the gap workflow, for terminal and report. They read the plain data of a result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture that a gap report opens with: the arm with the named effects where they act, and the gap shrinking."""
+"""The opening figure of a gap report: the arm with the named effects at their places, and the gap before and after."""
 
 from __future__ import annotations
 

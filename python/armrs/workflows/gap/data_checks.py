@@ -1,4 +1,4 @@
-"""What is wrong with a data set before any fit: labels, units, signs, channels without information."""
+"""Checks of a data set before any fit: labels, units, signs, channels without information."""
 
 from __future__ import annotations
 

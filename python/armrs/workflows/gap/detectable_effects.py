@@ -1,4 +1,4 @@
-"""Before a session: the smallest effects that it would show."""
+"""The smallest effects that a planned session would detect."""
 
 from __future__ import annotations
 

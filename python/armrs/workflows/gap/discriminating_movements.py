@@ -1,4 +1,4 @@
-"""Movements that would distinguish an effect from those that explain the data as well."""
+"""Movements that distinguish a named effect from its alternatives."""
 
 from __future__ import annotations
 

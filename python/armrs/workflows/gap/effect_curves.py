@@ -1,4 +1,4 @@
-"""One named effect by itself: its law along the movements, and what it changes in the channels."""
+"""The contribution of one named effect: its law along the movements, and its change of the channels."""
 
 from __future__ import annotations
 

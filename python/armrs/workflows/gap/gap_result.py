@@ -1,4 +1,4 @@
-"""What the gap workflow returns: what the core found, with the data set that it was found in."""
+"""The result of the gap workflow: that of the core, with its data set."""
 
 from __future__ import annotations
 

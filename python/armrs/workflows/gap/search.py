@@ -1,4 +1,4 @@
-"""The gap workflow: where simulation and data disagree, which effect is missing, and what adding it gains."""
+"""The whole gap workflow, `find_gap`: which effect is missing, and how much it reduces the gap."""
 
 from __future__ import annotations
 

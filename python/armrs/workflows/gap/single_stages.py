@@ -1,4 +1,4 @@
-"""The stages of the gap workflow, each by itself: compare, calibrate, (name: `find_gap`), separate, confirm."""
+"""Single stages of the gap workflow: `compare`, `calibrate`, `confirm`."""
 
 from __future__ import annotations
 

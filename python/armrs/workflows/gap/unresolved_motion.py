@@ -1,4 +1,4 @@
-"""Movements whose path between the samples is not known well enough for the forces to be simulated."""
+"""Movements whose path between the samples is too uncertain for simulating the forces."""
 
 from __future__ import annotations
 

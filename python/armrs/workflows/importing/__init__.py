@@ -1,4 +1,4 @@
-"""Own recordings into a data set."""
+"""Conversion of recordings to a data set: `armrs import`."""
 
 from .run_import import Imported as Imported
 from .run_import import import_recordings as import_recordings

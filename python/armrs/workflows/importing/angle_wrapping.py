@@ -1,4 +1,4 @@
-"""Which turn angles are counted in, decided over all trials together: recorders wrap angles at ±180° or at 360°."""
+"""Angles that the recorder wraps at ±180° or at 360°: the turn in which they are counted, decided over all trials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The clock of forces that were recorded by another device, aligned with that of the angles by what both show: the arm's movement."""
+"""Clock offset between forces and angles from different devices, by regression on the equation of motion."""
 
 from __future__ import annotations
 

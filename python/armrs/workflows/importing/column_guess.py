@@ -1,4 +1,4 @@
-"""Which raw column is which quantity, from its name and unit in the languages that laboratories use, and why."""
+"""Which raw column is which quantity, from names and units in several languages, with the reason."""
 
 from __future__ import annotations
 

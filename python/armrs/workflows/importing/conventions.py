@@ -1,4 +1,4 @@
-"""How raw angles and forces are counted, read off the balance of the arm.
+"""Angle convention and direction of the force, inferred from the balance of the arm.
 
 For each convention that laboratories use, the torques of the contact force are regressed on gravity, inertia and passive joint laws
 (`armrs.analysis.torque_balance`); the wrong convention leaves most of them unexplained.

@@ -1,4 +1,4 @@
-"""Remarks of an import on its files: decisions of the readers, and remarks that were recorded with the samples."""
+"""Remarks of an import: decisions of the readers, and remarks recorded with the samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which raw file is which trial: configuration, repeat and role from names, and the file of forces that belongs to a file of angles."""
+"""Which raw file is which trial: configuration, repeat and role from file names, and pairs of angle and force files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trials with their forces on the clock of their angles: near it by the posture of the arm, then by its equation of motion."""
+"""Trials with their forces on the clock of the angles: by posture first, then by the equation of motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Positions of the handle that a robot's controller recorded, as joint angles of the robot of the model."""
+"""Joint angles of the robot from positions of the handle, by inverse kinematics."""
 
 from __future__ import annotations
 

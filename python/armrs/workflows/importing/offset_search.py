@@ -1,4 +1,4 @@
-"""Which offset of a force recording's clock makes its forces belong to the movement, for all recordings of a session together.
+"""Clock offset of force recordings by correlation with posture and acceleration, for all recordings of a session together.
 
 Only the posture is used, whatever the convention of the angles: forces are regressed on sines and cosines of the sums of neighbouring
 angles, which gravity of a moving arm consists of, on their second derivatives, which its inertia consists of, and on speeds.

@@ -1,4 +1,4 @@
-"""The raw tables of an import: of files and folders, without what is no recording and what is there twice."""
+"""The raw tables of an import, without files that are no recordings and without duplicates."""
 
 from __future__ import annotations
 

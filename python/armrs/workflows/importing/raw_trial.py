@@ -1,4 +1,4 @@
-"""Trials of an import with their raw tables, and the channels in them as SI units."""
+"""Trials of an import: their raw tables, and the channels in SI units."""
 
 from __future__ import annotations
 

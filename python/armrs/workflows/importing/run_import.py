@@ -1,4 +1,4 @@
-"""Own recordings into a data set: read, identify columns, decide conventions, write; every decision is kept in `import.toml`."""
+"""The whole import: read, identify columns, decide conventions, write."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The samples of a raw table: one clock, rows with a time, no codes for missing values."""
+"""Cleaning of a raw table: one clock, no rows without a time, no codes for missing values."""
 
 from __future__ import annotations
 
