@@ -23,10 +23,6 @@ def digits(value: float, count: int = 3) -> str:
     return f"{float(f'{value:.{count}g}'):.{max(count, 6)}g}"
 
 
-_EVEN = 0.95
-"""An interval of which one side is that much shorter than the other ends at a limit."""
-
-
 def how_many(number: int, what: str, several: str | None = None) -> str:
     """Return a number of things in words: one of them without the plural, which ends in s unless it is given."""
     return f"{number} {what if number == 1 else several or f'{what}s'}"

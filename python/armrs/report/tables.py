@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..formatting import (
-    _EVEN,
     digits,
     number,
     parameter_label,
@@ -22,6 +21,8 @@ from ..formatting import (
     unit,
 )
 
+_SYMMETRIC = 0.95
+"""An interval ends at a limit if the ratio of its shorter to its longer side is less."""
 DECIDED_BY = {
     "data": "the measurement",
     "prior": "the model as given, because these movements do not show it",
@@ -69,7 +70,7 @@ def _note(item: Mapping[str, Any]) -> str | None:
     """Return the reservations about an estimate: its caveat, and that its interval ends at a physical limit."""
     said = [item["caveat"]] if item.get("caveat") else []
     below, above = (abs(end - item["value"]) for end in item["interval"])
-    if min(below, above) < _EVEN * max(below, above):
+    if min(below, above) < _SYMMETRIC * max(below, above):
         said.append(f"interval ends at {item['interval'][int(above < below)] + 0.0:.3g}")
     return ", ".join(said) or None
 
