@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from armrs.cosim.accuracy import estimates, run_checked
+from armrs.cosim.error_estimate import estimates, run_checked
 from armrs.cosim.master import run_system
 from armrs.cosim.system import System
 from armrs.errors import CoupledError

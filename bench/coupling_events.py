@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.coupled import Coupled
+from armrs.cosim.coupled_run import CoupledRun
+from armrs.cosim.error_estimate import run_checked
 from armrs.cosim.master import run_system
-from armrs.cosim.ready import Ready
+from armrs.cosim.sources_and_controllers import BuiltInSlave
 from armrs.cosim.system import System, couple
 from armrs.errors import CoupledError
 from armrs.model import load_model
@@ -29,7 +29,7 @@ DURATION, FINE = 0.4, 0.25e-3 / 8
 HAND = float(Slave(ARM, start=START, rest=True).get("handle.r[1]")[0])
 
 
-class Pushing(Ready):
+class Pushing(BuiltInSlave):
     """A force of time, with a spring to where the hand begins where its stiffness is not zero."""
 
     def __init__(self, force: Callable[[float], float], stiffness: float) -> None:
@@ -65,7 +65,7 @@ def system(partner: Pushing, algorithm: str, step: float, shortest: float | None
     return couple(ordered, [*lines, ("partner.F", "arm.handle.F[1]")], **settings)
 
 
-def wrong(run: Coupled, fine: Coupled) -> list[str]:
+def wrong(run: CoupledRun, fine: CoupledRun) -> list[str]:
     """Return the variables with more error than is allowed."""
     found = []
     for e in run.estimates:

@@ -16,9 +16,9 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
-from armrs.cosim.imported import ImportedSlave
-from armrs.fmu.export import export_fmu
-from armrs.workflows.demo import true_model
+from armrs.cosim.fmu_export import export_fmu
+from armrs.demo import true_model
+from armrs.fmu.imported_slave import ImportedSlave
 
 INPUTS, OUTPUTS = ["handle.F[1]", "handle.F[2]"], ["handle.r[1]", "handle.r[2]", "handle.v[1]", "handle.v[2]"]
 STEP, STEPS, ROUNDS = 0.25e-3, 2000, 7

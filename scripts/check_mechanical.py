@@ -15,10 +15,10 @@ import sys
 import numpy as np
 
 from armrs import Dataset, Effect, Model, Movement, Tolerance, demo, identify
-from armrs.thesis import people
-from armrs.thesis.mechanical import MEASUREMENTS, SPEED, truth
-from armrs.thesis.printed import MECHANICAL, REFERENCE
-from armrs.thesis.simulation import MECHANICAL_PATH
+from armrs.thesis import simulated_arms
+from armrs.thesis.mechanical_arm import MEASUREMENTS, SPEED, truth
+from armrs.thesis.printed_values import MECHANICAL, REFERENCE
+from armrs.thesis.simulation_comparison import MECHANICAL_PATH
 
 LIMITS = {"m1*l1 + a1*m2": 1.0, "m2*l2": 1.0, "brake 1": 3.0, "brake 2": 3.0}
 """[%]"""
@@ -55,9 +55,9 @@ def errors(seed: int, allowed: Tolerance) -> dict[str, float]:
     arm = truth(brakes=True)
     read = uncalibrated(arm, allowed, np.random.default_rng([seed, 7])) if allowed.force_gain else arm
     movement = Movement(MECHANICAL_PATH.waypoints, speed=SPEED, acceleration=0.2)
-    made = people.run(read, movement, range(100_000 + 100 * seed, 100_000 + 100 * seed + MEASUREMENTS))
-    trials = tuple(people.trials(made, "movement"))
-    data = Dataset("mechanical arm", demo.handed_over(people.mechanical(True)), trials, "robot", tolerance=allowed, synthetic=True)
+    made = simulated_arms.run(read, movement, range(100_000 + 100 * seed, 100_000 + 100 * seed + MEASUREMENTS))
+    trials = tuple(simulated_arms.trials(made, "movement"))
+    data = Dataset("mechanical arm", demo.given_model(simulated_arms.mechanical(True)), trials, "robot", tolerance=allowed, synthetic=True)
     result = identify(data, with_effects=["coulomb"])
     found = {e.name: e.value for e in result.combinations} | {f"brake {e.joint}": e.value for e in result.parameters if e.kind == "coulomb"}
     return {name: 100.0 * (found[name] / known - 1.0) for name, known in KNOWN.items()}

@@ -22,7 +22,7 @@ import numpy as np
 
 import armrs
 from armrs import Dataset, Effect, Joint, Model, Movement, Sensors, Simulated, Subject, Tolerance, Trial
-from armrs.analysis.double_exponential import Course
+from armrs.analysis.double_exponential import MomentCurve
 from armrs.analysis.joint_coupling import fit, together
 from armrs.anthropometry import literature_arm
 from armrs.model import AddedMass, Contact, Robot
@@ -199,7 +199,7 @@ def over_trials(coupling: float, runs: int) -> int:
         fits = []
         for joint, adjacent, held, scatter in sides:
             courses = [
-                Course(q, 0.8 * q + coupling * np.radians(a) + s * draw.standard_normal(), float(np.radians(a)), str(a))
+                MomentCurve(q, 0.8 * q + coupling * np.radians(a) + s * draw.standard_normal(), float(np.radians(a)), str(a))
                 for a, s in zip(held, scatter, strict=True)
                 for _ in range(REPEATS)
             ]

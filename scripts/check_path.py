@@ -13,7 +13,7 @@ import numpy as np
 
 import armrs
 from armrs import Joint, Model, Movement, Trial
-from armrs.workflows.demo import true_model
+from armrs.demo import true_model
 
 WAYPOINTS = np.radians([[-56.0, 53.0], [-37.0, 43.0], [-52.0, 77.0], [-56.0, 53.0]])
 SPEED = 1.2

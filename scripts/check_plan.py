@@ -17,7 +17,7 @@ import numpy as np
 
 import armrs
 from armrs import Dataset, Effect, Joint, Model, Movement, Segment, Sensors, Tolerance, Trial
-from armrs.workflows.demo import true_model
+from armrs.demo import true_model
 from armrs.workflows.plan import Instruments, Limits, Plan, forecast, plan
 
 TOLERANCE = Tolerance(handle_placement_m=0.0)
@@ -39,7 +39,7 @@ def truth(segments: int = 2) -> Model:
     Two segments are the mechanical arm with its brakes, three the human arm of table 4.10 with the hand strapped to the handle.
     """
     if segments == 3:
-        from armrs.thesis.people import TABLE_4_10, WORKING_ROBOT
+        from armrs.thesis.simulated_arms import TABLE_4_10, WORKING_ROBOT
 
         joints = (
             Joint("shoulder", viscosity=0.20, coulomb=0.20),

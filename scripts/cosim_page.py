@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from armrs.cosim import Slave, Variable
-from armrs.workflows.demo import true_model
+from armrs.demo import true_model
 
 PAGE = Path(__file__).parent.parent / "docs" / "cosim_variables.md"
 HEAD = ("variable", "what it is", "unit", "causality", "variability", "initial")

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from armrs.cosim import Slave
+from armrs.cosim.fmu_export import export_fmu
+from armrs.demo import true_model
 from armrs.fmu.description import read_description
-from armrs.fmu.export import export_fmu
-from armrs.workflows.demo import true_model
 
 NAMES = ["q[1]", "q[2]", "energy"]
 START = np.radians([-60.0, 50.0])

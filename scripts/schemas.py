@@ -231,7 +231,7 @@ def experiment() -> Any:
             "name": {"type": "string"},
             "seed": {"type": "integer", "minimum": 0, "default": 1},
             "model": {"type": "string", "description": "the arm that is simulated, in place of a person of the literature"},
-            "believed": {"type": "string", "description": "the arm that is handed over, beside `model`"},
+            "believed": {"type": "string", "description": "the model in the data set; only beside `model`"},
             "subject": table(person),
             "joint": list_of(joint([]), most=3),
             "handle": table({"mass": number("[kg]", least=0.0, most=10.0, default=0.0)}),

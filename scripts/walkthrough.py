@@ -55,7 +55,7 @@ def main() -> int:
         print("walkthrough: skipped, no Rust for the target (rustup target add thumbv7em-none-eabihf)", file=sys.stderr)
         return 77
     page = (ROOT / "docs" / "firmware.md").read_text(encoding="utf-8")
-    section = page[page.index("## Into a C project") : page.index("### What changes")]
+    section = page[page.index("## Use in your own C project") : page.index("### Other targets")]
     with tempfile.TemporaryDirectory() as folder:
         commands, promised = ["set -euo pipefail"], []
         for language, name, content in BLOCK.findall(section):

@@ -192,7 +192,7 @@ shape = "smooth"
 def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small synthetic data set of a slow arm with dry friction that its model lacks; `truth.toml` and `movement.toml` lie beside it."""
     from armrs import Dataset, Sensors, Trial, simulate, write_dataset
-    from armrs.workflows.demo import handed_over, true_model
+    from armrs.demo import given_model, true_model
     from armrs.workflows.movement import load_movement
 
     folder = tmp_path_factory.mktemp("slow")
@@ -214,7 +214,7 @@ def slow_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
         )
         for k, read in enumerate(run.readings, start=1)
     )
-    write_dataset(Dataset("slow arm", handed_over(truth), trials, "robot", synthetic=True), folder)
+    write_dataset(Dataset("slow arm", given_model(truth), trials, "robot", synthetic=True), folder)
     return folder
 
 

@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from armrs.cosim.library import platform_folder
-from armrs.fmu import names
+from armrs.fmu import standard_names
+from armrs.fmu.shared_library import platform_folder
 
 Change = Callable[[str], str]
 SOURCE = Path(__file__).parent / "defective.c"
@@ -301,7 +301,7 @@ CLOCKS: dict[str, tuple[Change, str]] = {
 def stubs() -> str:
     """Return C for the functions of FMI 3.0 that the small library does not have: each says that it failed."""
     text = SOURCE.read_text(encoding="utf-8")
-    missing = [f"fmi3{name}" for name in names.FUNCTIONS[3] if f" fmi3{name}(" not in text and f"*fmi3{name}(" not in text]
+    missing = [f"fmi3{name}" for name in standard_names.FUNCTIONS[3] if f" fmi3{name}(" not in text and f"*fmi3{name}(" not in text]
     return "".join(f"int {name}(void) {{ return 3; }}\n" for name in missing)
 
 

@@ -125,6 +125,22 @@ def python_imports(package: Path) -> dict[str, set[str]]:
     return {name: used - {package.name} for name, used in graph.items() if name != package.name}
 
 
+def folder_imports(package: Path) -> dict[str, set[str]]:
+    """Return the folders that each folder of a package uses, directly or through modules beside the folders, which are in no circle."""
+    graph = python_imports(package)
+    folders = {path.name for path in package.iterdir() if path.is_dir()}
+
+    def behind(name: str) -> set[str]:
+        folder = name.split(".")[1]
+        return {folder} if folder in folders else {found for other in graph[name] for found in behind(other)}
+
+    used: dict[str, set[str]] = {}
+    for name, others in graph.items():
+        if (folder := name.split(".")[1]) in folders:
+            used[folder] = used.get(folder, set()) | {found for other in others for found in behind(other)} - {folder}
+    return used
+
+
 def late_imports(package: Path) -> dict[str, set[str]]:
     """Return the modules that functions of each module of a package import; the modules without any are left out."""
     return {name: used for name, used in _imports(package, late_alone=True).items() if used}

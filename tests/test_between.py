@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.between import outliers, parts
-from armrs.cosim.coupled import Coupled
-from armrs.cosim.imported import ImportedSlave
-from armrs.cosim.isolated import IsolatedSlave
+from armrs.cosim.coupled_run import CoupledRun
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.haptic_wall import Wall
+from armrs.cosim.intermediate_outputs import outliers, parts
 from armrs.cosim.master import run_system
-from armrs.cosim.partner import Partner, Status
-from armrs.cosim.ready import Ready, Wave
+from armrs.cosim.sources_and_controllers import BuiltInSlave, Wave
 from armrs.cosim.system import System, couple
-from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
+from armrs.fmu.imported_slave import ImportedSlave
+from armrs.fmu.isolated_slave import IsolatedSlave
+from armrs.fmu.slave_interface import Partner, Status
 from armrs.model import load_model
 from pythonfmu_builds import built
 
@@ -60,10 +60,10 @@ def smooth() -> Wave:
     return Wave("sine", amplitude=2.0, frequency=1.5, unit="N", name="wave")
 
 
-def refused(system: System) -> Coupled:
+def refused(system: System) -> CoupledRun:
     with pytest.raises(CoupledError) as error:
         run_checked(system)
-    run: Coupled = error.value.run
+    run: CoupledRun = error.value.run
     return run
 
 
@@ -93,7 +93,7 @@ def test_a_pulse_shorter_than_the_resolution_is_seen_with_a_finer_one(pulse: Pat
         assert refused(pushed(partner, 0.002, resolution=0.05e-3)).verdict == "not accurate"
 
 
-class Shaking(Ready):
+class Shaking(BuiltInSlave):
     """A sine that both runs see at its zeros alone."""
 
     def __init__(self) -> None:
@@ -116,7 +116,7 @@ def test_a_smooth_force_is_good_as_before() -> None:
     assert max(e.error for e in run.estimates if e.name == "wave.y") < 1e-3
 
 
-class Edges(Ready):
+class Edges(BuiltInSlave):
     """A force between two times, with a spring to the hand or without."""
 
     def __init__(self, begin: float, end: float, *, spring: bool) -> None:
@@ -280,7 +280,7 @@ def test_differences_of_rounding_are_no_finding() -> None:
     assert "; both runs are equal except for rounding; an event" in run.why
 
 
-class Slot(Ready):
+class Slot(BuiltInSlave):
     """Takes a position and does nothing."""
 
     def __init__(self) -> None:
@@ -324,7 +324,7 @@ def test_a_resolution_that_is_none_is_refused(value: float) -> None:
 
 
 # ---- what an unstable run is advised to do
-class Stiff(Ready):
+class Stiff(BuiltInSlave):
     """A spring from where the hand begins."""
 
     def __init__(self, *, can_rollback: bool) -> None:
@@ -367,7 +367,7 @@ def test_what_ends_with_an_error_keeps_the_run_that_was_made() -> None:
     wave.terminate = hang  # type: ignore[method-assign]
     with pytest.raises(CoupledError) as error:
         run_system(pushed(wave, 0.01))
-    run: Coupled = error.value.run
+    run: CoupledRun = error.value.run
     assert run.verdict == "failed"
     assert "wave: it does not return within 3 s" in str(error.value)
     assert len(run.t) == 21

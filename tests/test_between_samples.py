@@ -7,9 +7,9 @@ import pytest
 
 import armrs
 from armrs.io.dataset import Dataset
-from armrs.workflows.gap.between_samples import unresolved, unresolved_movements
 from armrs.workflows.gap.core_input import core_settings
-from armrs.workflows.gap.suspicion import examine
+from armrs.workflows.gap.data_checks import examine
+from armrs.workflows.gap.unresolved_motion import unresolved, unresolved_movements
 from gap_sessions import session
 
 

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs import cli
-from armrs.workflows import demo
-from armrs.workflows.checking import Ability, Checked, Problem, check_dataset, grouped
-from armrs.workflows.gap.suspicion import examine
+from armrs import cli, demo
+from armrs.workflows.check_dataset import Ability, Checked, Problem, check_dataset, grouped
+from armrs.workflows.gap.data_checks import examine
 from test_import import KNOWN, SI, Recording, recording, repeated, table, write_text
 
 __all__ = ["recording"]

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from armrs import BadInput, cli
-from armrs.report import clinic, session_changes
-from armrs.report.words import verdict
+from armrs.report import clinic_page, session_changes
+from armrs.report.sentences import verdict
 
 NORMS = """\
 [[norm]]
@@ -52,32 +52,32 @@ def result(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
-def norms(tmp_path: Path) -> tuple[clinic.Norm, ...]:
+def norms(tmp_path: Path) -> tuple[clinic_page.Norm, ...]:
     (tmp_path / "norms.toml").write_text(NORMS, encoding="utf-8")
-    return clinic.load_norms(tmp_path / "norms.toml")
+    return clinic_page.load_norms(tmp_path / "norms.toml")
 
 
-def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic.Norm, ...]) -> None:
-    stiffness, rest, friction, speed = clinic.lines_of(result(), norms)
+def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic_page.Norm, ...]) -> None:
+    stiffness, rest, friction, speed = clinic_page.lines_of(result(), norms)
     assert stiffness.value == pytest.approx(1.8 * math.radians(10.0))
     assert rest.value == pytest.approx(math.degrees(-1.0))
-    assert clinic.words_of(stiffness) == [
+    assert clinic_page.words_of(stiffness) == [
         "shoulder", "Stiffness [N m per 10°]", "0.314", "0.283 to 0.346", "0.087 to 0.244, above it", "higher by 0.157 ± 0.048 (+100 %)",
     ]  # fmt: skip
-    assert clinic.words_of(friction)[2:4] == ["none seen", "at most 0.030"]
-    assert speed.value is None and clinic.words_of(speed)[2:4] == ["not measured", ""]
+    assert clinic_page.words_of(friction)[2:4] == ["none seen", "at most 0.030"]
+    assert speed.value is None and clinic_page.words_of(speed)[2:4] == ["not measured", ""]
 
 
-def test_angles_are_counted_as_in_the_laboratory(norms: tuple[clinic.Norm, ...]) -> None:
+def test_angles_are_counted_as_in_the_laboratory(norms: tuple[clinic_page.Norm, ...]) -> None:
     """A laboratory with the arm hanging at zero and clockwise positive read our horizontal zero."""
     as_there = {"signs": [-1, 1], "zero_deg": [-90.0, 0.0], "words": "as in the laboratory: hanging"}
     found = result(data=result()["data"] | {"angles": as_there})
-    _, rest, *_ = clinic.lines_of(found, norms)
+    _, rest, *_ = clinic_page.lines_of(found, norms)
     assert rest.value == pytest.approx(-(math.degrees(-1.0) + 90.0))
     assert rest.interval == pytest.approx((-(math.degrees(-0.9) + 90.0), -(math.degrees(-1.1) + 90.0)))
-    said = clinic.measured([found])
+    said = clinic_page.measured([found])
     assert "shoulder from −80° to −30°" in said[1] and said[2] == "Angles: as in the laboratory: hanging."
-    assert "from the horizontal" in clinic.measured([result()])[2]
+    assert "from the horizontal" in clinic_page.measured([result()])[2]
 
 
 def test_what_is_followed_is_drawn_as_the_table_counts_it() -> None:
@@ -86,7 +86,7 @@ def test_what_is_followed_is_drawn_as_the_table_counts_it() -> None:
     stiffness = result()["history"][0]
     rest = stiffness | {"name": "rest", "values": [-1.0, -0.9], "stds": [0.1, 0.2]}
     other = stiffness | {"kind": "segment", "name": "m1*l1"}
-    one, two = clinic.followed([result(data=result()["data"] | {"angles": as_there}, history=[stiffness, rest, other])])
+    one, two = clinic_page.followed([result(data=result()["data"] | {"angles": as_there}, history=[stiffness, rest, other])])
     assert (one["name"], one["joint"], one["unit"]) == ("shoulder: stiffness", None, "N m per 10°")
     assert one["values"] == pytest.approx([0.9 * math.radians(10.0), 1.8 * math.radians(10.0)])
     assert two["name"] == "shoulder: resting angle"
@@ -100,7 +100,7 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
     gap = result(verb="gap", verdict="explained", effects=[{"kind": "elastic", "joint": 1, "parameters": parameters}], history=[])
     for name, data in (("a", result()), ("b", gap)):
         (tmp_path / f"{name}.json").write_text(json.dumps(data), encoding="utf-8")
-    text = clinic.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html").read_text(encoding="utf-8")
+    text = clinic_page.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html").read_text(encoding="utf-8")
     assert text.count("Stiffness [N m per 10°]") == 1 and ">0.314<" in text
     assert (
         "The table has the values of armrs identify. The page of gap fits only what the recordings ask for, together with everything else "
@@ -110,21 +110,21 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
     assert "resting angle differs" not in text
 
 
-def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic.Norm, ...], tmp_path: Path) -> None:
+def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic_page.Norm, ...], tmp_path: Path) -> None:
     """What changed, by how much, whether that is sure and what next are what a therapist asks; the page said it under "unusual"."""
     change = result()["history"][0]
     same = change | {"name": "torque", "kind": "coulomb", "since_last": 0.01, "since_last_std": 0.02, "changed_since_last": False}
-    lines = clinic.lines_of(result(history=[change, same]), norms)
-    assert session_changes.said(lines) == [
+    lines = clinic_page.lines_of(result(history=[change, same]), norms)
+    assert session_changes.change_lines(lines) == [
         "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",
         session_changes.SURE,
         "No clear change: shoulder (friction).",
         session_changes.EITHER_WAY,
     ]
-    assert clinic.words_of(lines[2])[5] == "no clear change: +0.010 ± 0.039"
-    assert session_changes.said(clinic.lines_of(result(history=[]))) == []
+    assert clinic_page.words_of(lines[2])[5] == "no clear change: +0.010 ± 0.039"
+    assert session_changes.change_lines(clinic_page.lines_of(result(history=[]))) == []
     (tmp_path / "a.json").write_text(json.dumps(result(history=[change, same])), encoding="utf-8")
-    page = clinic.write_summary([tmp_path / "a.json"], tmp_path / "s.html").read_text(encoding="utf-8")
+    page = clinic_page.write_summary([tmp_path / "a.json"], tmp_path / "s.html").read_text(encoding="utf-8")
     heads = [page.index(head) for head in ("What changed since", "What was found", "Over the sessions", "What next")]
     assert heads == sorted(heads)
 
@@ -137,22 +137,22 @@ def test_a_share_of_an_angle_is_not_stated() -> None:
     assert session_changes.trend(0.0, 0.00999, None, clear=False) == "no clear change: +0.000 ± 0.010"
 
 
-def test_what_is_unusual_is_said_in_words(norms: tuple[clinic.Norm, ...]) -> None:
-    said = clinic.unusual(clinic.lines_of(result(), norms))
+def test_what_is_unusual_is_said_in_words(norms: tuple[clinic_page.Norm, ...]) -> None:
+    said = clinic_page.unusual(clinic_page.lines_of(result(), norms))
     assert said == [
         "shoulder: stiffness is above the usual range.",
     ]
-    assert clinic.unusual(clinic.lines_of(result(history=[]))) == []
+    assert clinic_page.unusual(clinic_page.lines_of(result(history=[]))) == []
     left = [{"verb": "gap", "verdict": verdict} for verdict in ("explained", "unexplained")]
-    assert clinic.unusual([], left[:1]) == []
-    assert clinic.unusual([], left) == [
+    assert clinic_page.unusual([], left[:1]) == []
+    assert clinic_page.unusual([], left) == [
         "Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it."
     ]
-    assert len(clinic.notes([result(warnings=list("abcdef"))])) == clinic.MOST_NOTES + 1
-    assert clinic.notes([result(warnings=["slow: joint 2 moved"])]) == ["slow: elbow moved"]
+    assert len(clinic_page.notes([result(warnings=list("abcdef"))])) == clinic_page.MOST_NOTES + 1
+    assert clinic_page.notes([result(warnings=["slow: joint 2 moved"])]) == ["slow: elbow moved"]
     # The same of several movements is said once: one page has no room for a line of each.
     several = ["fast: joint 2 moved: left out", "noisy", "faster: joint 2 moved: left out", "noisy"]
-    assert clinic.notes([result(warnings=several)]) == ["fast, faster: elbow moved: left out", "noisy"]
+    assert clinic_page.notes([result(warnings=several)]) == ["fast, faster: elbow moved: left out", "noisy"]
 
 
 def test_a_slip_and_a_tremor_are_unusual_and_a_spring_is_not() -> None:
@@ -170,15 +170,15 @@ def test_a_slip_and_a_tremor_are_unusual_and_a_spring_is_not() -> None:
         },
     ]
     gap = {"verb": "gap", "verdict": "explained", "effects": effects, "data": {"joints": ["shoulder", "elbow"]}}
-    assert clinic.unusual([], [gap]) == [
+    assert clinic_page.unusual([], [gap]) == [
         "The analysis found: muscle tremor (elbow).",
         "In the recording slow_1, 2.6 to 5.7 s: handle that slips. This part was left out.",
     ]
 
 
 @pytest.mark.parametrize(("value", "said"), [(0.6, "within"), (0.5, "not clear"), (0.1, "below"), (3.0, "above")])
-def test_the_interval_is_compared_with_the_norm_not_the_value(value: float, said: str, norms: tuple[clinic.Norm, ...]) -> None:
-    lines = clinic.lines_of(result(parameters=[estimate("elastic", "stiffness", 1, value, 0.05)]), norms)
+def test_the_interval_is_compared_with_the_norm_not_the_value(value: float, said: str, norms: tuple[clinic_page.Norm, ...]) -> None:
+    lines = clinic_page.lines_of(result(parameters=[estimate("elastic", "stiffness", 1, value, 0.05)]), norms)
     assert [line.beside_norm for line in lines] == [said]
 
 
@@ -217,11 +217,11 @@ def test_intervals_claim_no_more_than_holds(tmp_path: Path) -> None:
     ):
         source = tmp_path / f"{name}.json"
         source.write_text(json.dumps(result(**changes)), encoding="utf-8")
-        page = clinic.write_summary([source], tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        page = clinic_page.write_summary([source], tmp_path / f"{name}.html").read_text(encoding="utf-8")
         assert said in page, name
         # With one session the figure of the joints has the caption.
         source.write_text(json.dumps(result(**changes, history=[])), encoding="utf-8")
-        alone = clinic.write_summary([source], tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        alone = clinic_page.write_summary([source], tmp_path / f"{name}.html").read_text(encoding="utf-8")
         assert said in alone.partition("<figcaption>")[2].partition("/figcaption>")[0], name
         assert "95 of 100" not in page
 
@@ -230,8 +230,8 @@ def test_a_resistance_that_may_be_none_is_told_as_a_limit() -> None:
     curve = {"joint": 1, "configuration": "slow", "repeats": 3, "half_width_mean_Nm": 0.06, "half_width_interval_Nm": [-0.03, 0.15]}
     # The movement with an interval is known better than one with more repeats that share no angle.
     other = {**curve, "configuration": "fast", "repeats": 4, "half_width_mean_Nm": 0.3, "half_width_interval_Nm": [None, None]}
-    (line,) = clinic.lines_of(result(verb="passive", curves=[other, curve], history=[]))
-    assert clinic.words_of(line)[2:4] == ["none seen", "at most 0.150"]
+    (line,) = clinic_page.lines_of(result(verb="passive", curves=[other, curve], history=[]))
+    assert clinic_page.words_of(line)[2:4] == ["none seen", "at most 0.150"]
     named = {**curve, "joint_name": "shoulder"}
     assert (
         verdict({"verb": "passive", "curves": [named]})
@@ -255,7 +255,7 @@ def test_what_no_summary_is_made_of_is_refused(change: dict[str, Any], message: 
     source = tmp_path / "x.json"
     source.write_text(json.dumps(result(**change)), encoding="utf-8")
     with pytest.raises(BadInput, match=message):
-        clinic.write_summary([source], tmp_path / "summary.html")
+        clinic_page.write_summary([source], tmp_path / "summary.html")
 
 
 def test_norms_are_refused_with_their_place(tmp_path: Path) -> None:
@@ -265,5 +265,5 @@ def test_norms_are_refused_with_their_place(tmp_path: Path) -> None:
     ):
         (tmp_path / "n.toml").write_text(NORMS.replace(old, new), encoding="utf-8")
         with pytest.raises(BadInput, match=message):
-            clinic.load_norms(tmp_path / "n.toml")
+            clinic_page.load_norms(tmp_path / "n.toml")
     assert cli.main(["report", "x.json", "--norms", "n.toml"]) == 2

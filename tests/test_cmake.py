@@ -14,7 +14,7 @@ import pytest
 
 import armrs
 from armrs import online
-from armrs.workflows.demo import true_model
+from armrs.demo import true_model
 
 ROOT = Path(__file__).parents[1]
 LEVEL = 0.186 * 2.114 + (0.322 + 0.121) * 1.264

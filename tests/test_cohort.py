@@ -13,7 +13,7 @@ from armrs import BadInput
 from armrs.analysis import mixed_model
 from armrs.cli import main
 from armrs.io import files
-from armrs.report import clinic_words
+from armrs.report import clinic_sentences
 
 SEED = 7101
 
@@ -87,7 +87,7 @@ def test_groups_and_sides_that_differ_are_told(tmp_path: Path) -> None:
     bands = {(q.group, q.side): q for q in found.quantities}
     assert len(bands) == 4 and bands["control", "l"].within_std == pytest.approx(0.05, rel=0.3)
     assert len(found.values_of(bands["patient", "r"])) == 15
-    said = clinic_words.verdict(found.to_dict() | {"verb": "cohort"})
+    said = clinic_sentences.verdict(found.to_dict() | {"verb": "cohort"})
     assert "higher in patient than in control and higher in r than in l (group patient)" in said
 
 

@@ -14,16 +14,16 @@ import pytest
 
 from armrs import Contact, Joint, Model, _armrs, cli
 from armrs.cosim import Partner, Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.coupled import Coupled
-from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.coupled_run import CoupledRun
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.fmu_export import export_fmu
+from armrs.cosim.haptic_wall import Wall
 from armrs.cosim.master import run_system
-from armrs.cosim.partner import StepResult, Variable
-from armrs.cosim.ready import Ready
+from armrs.cosim.sources_and_controllers import BuiltInSlave
 from armrs.cosim.system import couple, load_system
-from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
-from armrs.fmu.export import export_fmu
+from armrs.fmu.imported_slave import ImportedSlave
+from armrs.fmu.slave_interface import StepResult, Variable
 from armrs.model import Segment, load_model
 from armrs.workflows.simulate import CoreDrive, CoreRun
 from markup import unescaped
@@ -83,7 +83,7 @@ class Rig:
             s = 1.0 - 0.5 * top / ramp * (half - t) ** 2
         return [float(self.handle[0] + WAY * (1.0 - s if back else s)), float(self.handle[1])]
 
-    def run(self, robot: Path, port: str, algorithm: str, step: float, arm: Partner | None = None) -> Coupled:
+    def run(self, robot: Path, port: str, algorithm: str, step: float, arm: Partner | None = None) -> CoupledRun:
         arm = arm or Slave(self.model, port=port, start=self.q, handle=(self.handle[0], self.handle[1]))
         with ImportedSlave(robot, name="robot") as partner:
             starts = {"robot": {"y0": self.handle[0], "z0": self.handle[1], "way": WAY, "ramp": RAMP, "duration": DURATION}}
@@ -91,7 +91,7 @@ class Rig:
             lines = FORCE if port == "force" else MOTION
             return run_system(couple(slaves, lines, algorithm=algorithm, step=step, duration=DURATION, starts=starts))
 
-    def error(self, run: Coupled) -> float:
+    def error(self, run: CoupledRun) -> float:
         """Largest difference of the joint angles [rad]."""
         at = np.round(run.t / 1e-3).astype(int)
         q = np.column_stack([run.columns["arm.q[1]"], run.columns["arm.q[2]"]])
@@ -231,7 +231,7 @@ def test_a_partner_that_asks_to_end_ends_the_run() -> None:
 
 
 # ---- a wall
-def wall_system(algorithm: str, step: float, damping: float = 3000.0) -> Coupled:
+def wall_system(algorithm: str, step: float, damping: float = 3000.0) -> CoupledRun:
     system = load_system(EXAMPLES / "cosim" / "wall.toml")
     slaves = [system.slaves["arm"], Wall("y", 0.1, 3000.0, damping)]
     lines = [("arm.handle.r", "wall.r"), ("arm.handle.v", "wall.v"), ("wall.F", "arm.handle.F")]
@@ -424,7 +424,7 @@ def test_an_fmu_that_refuses_is_one_line(folder: Path, capsys: pytest.CaptureFix
 
 
 # ---- arrays, and what a connection does to a value
-class Vector(Ready):
+class Vector(BuiltInSlave):
     """Holds an array; gives it back turned round, as an array of two rows."""
 
     def __init__(self, name: str) -> None:

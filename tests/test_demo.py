@@ -63,7 +63,7 @@ def test_the_known_values_are_those_of_table_4_3() -> None:
     truth = demo.true_model()
     assert [(s.length, s.com, s.mass) for s in truth.segments] == [(0.376, 0.184, 1.440), (0.239, 0.115, 1.160)]
     assert [j.coulomb for j in truth.joints] == [0.139, 0.161]
-    given = demo.handed_over(truth)
+    given = demo.given_model(truth)
     assert [j.coulomb for j in given.joints] == [0.0, 0.0]
     assert [s.mass for s in given.segments] == pytest.approx([1.584, 1.276])
 

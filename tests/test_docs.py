@@ -98,7 +98,7 @@ def test_the_rows_of_files_md_are_read_as_it_says(session: Path) -> None:
 
 def test_a_horizontal_arm_that_is_carried_has_the_force_up() -> None:
     """The check of `force_on` in files.md: the last segment horizontal, the arm relaxed."""
-    from armrs.workflows.demo import true_model
+    from armrs.demo import true_model
 
     model = true_model().replace(joints=(armrs.Joint("shoulder"), armrs.Joint("elbow")))
     for shoulder in (-80.0, -45.0, 40.0):
@@ -120,7 +120,7 @@ def test_every_default_of_files_md_is_that_of_the_code() -> None:
 
 
 def test_files_md_names_every_key_of_an_identification(session: Path) -> None:
-    from armrs.report.plain import identified_data
+    from armrs.workflows.result_data import identified_data
 
     text = (DOCS / "files.md").read_text(encoding="utf-8")
     data = identified_data(armrs.identify(session))
@@ -132,8 +132,8 @@ def test_the_python_of_the_readme_prints_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Blocks that name a folder run where the demonstration has been; there a comment behind `print` is what it prints."""
+    from armrs.demo import measure, true_model
     from armrs.io.dataset import write_dataset
-    from armrs.workflows.demo import measure, true_model
 
     monkeypatch.chdir(tmp_path)
     write_dataset(measure(true_model()), "armrs-demo/data")
@@ -218,7 +218,7 @@ def test_every_test_and_function_of_the_table_of_equations_exists() -> None:
 
 def test_the_thesis_is_cited() -> None:
     """Author, title and year stand wherever a reader meets "the thesis" first."""
-    from armrs.thesis.left_out import THESIS
+    from armrs.thesis.not_recomputed import THESIS
 
     for name in ("README.md", "docs/architecture.md", "CITATION.cff"):
         text = " ".join((ROOT / name).read_text(encoding="utf-8").split())

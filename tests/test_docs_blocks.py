@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs import cli
+from armrs import cli, demo
 from armrs.io import tomlfile
 from armrs.io.dataset import write_dataset
 from armrs.io.samples import write_samples
-from armrs.workflows import demo
 from test_docs import DOCS, ROOT, blocks
 
 SHELL = ("sh", "text")
@@ -107,7 +106,7 @@ def test_python_prints_what_its_comments_say(
 def test_python_of_the_firmware_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """On two seconds of a log of the demo's arm."""
     truth = demo.true_model()
-    demo.handed_over(truth).write("identified.toml")
+    demo.given_model(truth).write("identified.toml")
     moved = armrs.simulate(truth, armrs.Movement(np.radians([[-60, 60], [-30, 20], [-60, 60]]), speed=1.0, acceleration=4.0), rate=1000.0)
     columns = [moved.t, *moved.q.T, *moved.force_on_arm.T]
     write_samples(Path("log.csv"), ["t_s", "q1_rad", "q2_rad", "Fy_N", "Fz_N"], columns)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armrs.analysis import preconditioning
-from armrs.analysis.double_exponential import Course
+from armrs.analysis.double_exponential import MomentCurve
 from armrs.analysis.joint_coupling import Dependence, fit
 
 SEED = 28_001
@@ -25,7 +25,7 @@ def ankle(plantar: np.ndarray, knee: float) -> np.ndarray:
     return np.asarray(np.exp(-7.9763 + 0.1949 * plantar + 0.0008 * knee) - np.exp(2.1016 - 0.0843 * plantar - 0.0176 * knee) + 1.792)
 
 
-def courses(law: Law, own: tuple[float, float], held: tuple[float, ...], draw: np.random.Generator, repeats: int = 2) -> list[Course]:
+def courses(law: Law, own: tuple[float, float], held: tuple[float, ...], draw: np.random.Generator, repeats: int = 2) -> list[MomentCurve]:
     """Trials with tone of 1 N m and noise of 0.05 N m that is correlated over three angles; angles in degrees."""
     q = np.linspace(*own, 24)
     found = []
@@ -33,7 +33,7 @@ def courses(law: Law, own: tuple[float, float], held: tuple[float, ...], draw: n
         for _ in range(repeats):
             noise = 0.05 * np.convolve(draw.standard_normal(26), np.ones(3), mode="valid") / np.sqrt(3.0)
             moment = law(q, adjacent) + draw.standard_normal() + noise
-            found.append(Course(np.radians(q), moment, float(np.radians(adjacent)), f"{adjacent:g}"))
+            found.append(MomentCurve(np.radians(q), moment, float(np.radians(adjacent)), f"{adjacent:g}"))
     return found
 
 

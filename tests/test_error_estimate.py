@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import estimates, run_checked
+from armrs.cosim.error_estimate import estimates, run_checked
 from armrs.cosim.master import run_system
-from armrs.cosim.partner import Partner, Status, StepResult, Variable, listed
 from armrs.cosim.system import System, couple
 from armrs.errors import CoupledError
+from armrs.fmu.slave_interface import Partner, Status, StepResult, Variable, listed
 from armrs.model import Contact, Joint, Model, Segment
 
 NEWTON, METRE, SPEED = (1, 1, -2, 0), (0, 1, 0, 0), (0, 1, -1, 0)

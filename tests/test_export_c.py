@@ -17,9 +17,9 @@ import armrs
 from armrs import online
 from armrs.catalogue import catalogue
 from armrs.cli import main
+from armrs.demo import true_model
 from armrs.errors import BadInput
 from armrs.model import Effect
-from armrs.workflows.demo import true_model
 from armrs.workflows.firmware import FirmwareSource, covariance_of, export_c, unknowns_of
 
 ROOT = Path(__file__).parents[1]

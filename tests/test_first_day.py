@@ -17,18 +17,18 @@ import pyarrow.parquet as pq
 import pytest
 
 import armrs
-from armrs import anthropometry, cli
-from armrs.analysis import balance
+from armrs import anthropometry, cli, demo
+from armrs.analysis import torque_balance
 from armrs.errors import BadInput
 from armrs.io.raw import RawTable, read_raw
 from armrs.io.raw.table import Remark, column, remarks_of
-from armrs.report import console, html, moving, plotting
-from armrs.workflows import demo, setup
-from armrs.workflows.importing import clock, handle, matching
-from armrs.workflows.importing.columns import symbol_of
+from armrs.report import console, html, plotting, run_animation
+from armrs.workflows import setup_check
+from armrs.workflows.importing import clock_offset, handle_positions, offset_search
+from armrs.workflows.importing.column_guess import symbol_of
+from armrs.workflows.importing.file_remarks import timed
 from armrs.workflows.importing.recipe import load_recipe
-from armrs.workflows.importing.remarks import timed
-from armrs.workflows.importing.samples import cleaned
+from armrs.workflows.importing.sample_cleaning import cleaned
 from armrs.workflows.residuals import residuals
 from test_import_sources import on_a_terminal
 
@@ -149,10 +149,10 @@ def test_forces_on_their_own_clock_share_the_laws_of_the_arm(world: Path, apart:
     recordings = []
     for trial, offset in zip(data.trials, offsets, strict=True):
         assert trial.force_on_arm is not None
-        found = matching.together([matching.Match.of(trial.t, trial.q, trial.t + offset, trial.force_on_arm)])[0]
+        found = offset_search.together([offset_search.Match.of(trial.t, trial.q, trial.t + offset, trial.force_on_arm)])[0]
         near = min(found, key=lambda seconds, at=offset: abs(seconds + at))
-        recordings.append(clock.Recording(trial.t, trial.q, trial.t + offset, trial.force_on_arm, near))
-    shifts = np.array(clock.refine(data.model, recordings))
+        recordings.append(clock_offset.Recording(trial.t, trial.q, trial.t + offset, trial.force_on_arm, near))
+    shifts = np.array(clock_offset.refine(data.model, recordings))
     assert np.abs(shifts + offsets).max() < within
     assert (np.ptp(shifts) == 0.0) == (apart == 0.0)
 
@@ -205,9 +205,9 @@ def in_pounds(dataset: armrs.Dataset) -> armrs.Dataset:
 def test_forces_in_another_unit_and_another_body_are_told(imported: Path, tmp_path: Path) -> None:
     """The springs took up what the weight of the arm left, and nothing was said."""
     dataset = armrs.load_dataset(imported)
-    assert setup.other_weight(dataset) is None
+    assert setup_check.other_weight(dataset) is None
     wrong = in_pounds(dataset)
-    found = setup.other_weight(wrong)
+    found = setup_check.other_weight(wrong)
     assert found is not None and found.factor == pytest.approx(4.8, abs=0.3) and found.apart > 10.0
     said = "times the masses and first moments of the model"
     small = armrs.identify(some(wrong, "elbow", "reach", "raised"), with_effects="elastic,viscous")
@@ -218,18 +218,18 @@ def test_forces_in_another_unit_and_another_body_are_told(imported: Path, tmp_pa
     ]
     lengths = [s.length for s in dataset.model.segments]
     heavy = anthropometry.literature_model(armrs.Subject(93.0, 1.75, "male"), lengths).replace(robot=dataset.model.robot)
-    found = setup.other_weight(dataset.replace(model=heavy))
+    found = setup_check.other_weight(dataset.replace(model=heavy))
     assert found is not None and found.factor == pytest.approx(0.74, abs=0.05) and found.apart > 2.0
     assert "a wrong body mass" in str(found) and "lbf" not in str(found)
-    assert setup.other_weight(dataset.replace(model=heavy.replace(gravity=0.0))) is None
-    assert balance.weight_of(dataset.model, [still(dataset)]) is None
+    assert setup_check.other_weight(dataset.replace(model=heavy.replace(gravity=0.0))) is None
+    assert torque_balance.weight_of(dataset.model, [still(dataset)]) is None
 
 
-def still(dataset: armrs.Dataset) -> balance.Motion:
+def still(dataset: armrs.Dataset) -> torque_balance.Motion:
     """An arm that stands: its weight and a constant moment are the same then."""
     trial = dataset.trials[0]
     n = len(trial.t)
-    motion = balance.motion_of([(trial.t, np.tile(trial.q[:1], (n, 1)), np.tile([1.0, 2.0], (n, 1)), None)])
+    motion = torque_balance.motion_of([(trial.t, np.tile(trial.q[:1], (n, 1)), np.tile([1.0, 2.0], (n, 1)), None)])
     assert motion is not None
     return motion
 
@@ -259,15 +259,15 @@ def test_a_fit_at_the_noise_is_not_called_poor(imported: Path) -> None:
 def test_robot_angles_that_do_not_hold_the_hand_are_told(tmp_path: Path) -> None:
     dataset = demo.measure(demo.true_model())
     pairs = [(t.q, t.robot_q, t.force_on_arm) for t in dataset.trials if t.robot_q is not None]
-    robot, apart = handle.robot_of(dataset.model, pairs)
+    robot, apart = handle_positions.robot_of(dataset.model, pairs)
     true = dataset.model.robot
     assert robot is not None and true is not None and apart < 2e-3
     assert np.abs(np.subtract(robot.lengths + robot.base, true.lengths + true.base)).max() < 5e-3
-    none, apart = handle.robot_of(dataset.model, [(q, -qr, force) for q, qr, force in pairs])
+    none, apart = handle_positions.robot_of(dataset.model, [(q, -qr, force) for q, qr, force in pairs])
     assert none is None and apart > 0.02
     still = [(q[:1].repeat(len(q), axis=0), qr[:1].repeat(len(q), axis=0), force) for q, qr, force in pairs[:1]]
-    assert handle.robot_of(dataset.model, still)[0] is None
-    assert handle.robot_of(dataset.model, [(np.full_like(q, np.nan), qr, force) for q, qr, force in pairs])[0] is None
+    assert handle_positions.robot_of(dataset.model, still)[0] is None
+    assert handle_positions.robot_of(dataset.model, [(np.full_like(q, np.nan), qr, force) for q, qr, force in pairs])[0] is None
 
 
 def test_init_takes_a_robot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -353,7 +353,7 @@ def test_no_colour_stands_for_two_lines() -> None:
     n = model.n_joints
     rest = np.array([-0.8, 0.9, 0.0])[:n]
     path = armrs.Movement(np.array([rest, rest + 0.3, rest]), speed=0.5, acceleration=2.0)
-    live = moving.simulated(armrs.simulate(model.replace(effects=effects), path, rate=100.0))
+    live = run_animation.simulated(armrs.simulate(model.replace(effects=effects), path, rate=100.0))
     assert live.series is not None
     by_name: dict[str, set[str]] = {}
     for panel in live.series["panels"]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs.workflows.demo import true_model
+from armrs.demo import true_model
 
 MOVEMENT = armrs.Movement(np.radians([[-60, 60], [-48, 70], [-60, 60]]), speed=0.5, acceleration=2.0)
 NOISE = {"angle_noise": 1e-3, "force_noise": 0.1}

@@ -16,16 +16,16 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.cosim import Slave
-from armrs.cosim.imported import ImportedSlave
-from armrs.cosim.library import platform_folder
+from armrs.cosim.fmu_export import export_fmu
+from armrs.demo import true_model
 from armrs.errors import BadInput, SlaveError
-from armrs.fmu import names
+from armrs.fmu import standard_names
 from armrs.fmu.archive import unpack
 from armrs.fmu.check import check_fmu
 from armrs.fmu.description import read_description
-from armrs.fmu.export import export_fmu
+from armrs.fmu.imported_slave import ImportedSlave
+from armrs.fmu.shared_library import platform_folder
 from armrs.model import Model, Segment
-from armrs.workflows.demo import true_model
 
 ROOT = Path(__file__).parents[1]
 START = np.radians([-60.0, 50.0])
@@ -89,19 +89,19 @@ def test_the_same_arm_has_the_same_bytes(folder: Path, tmp_path: Path) -> None:
 
 
 def test_every_function_of_the_standards_is_there_and_no_python() -> None:
-    from armrs.fmu.libraries import library
+    from armrs.fmu.bundled_libraries import library
 
     content = library().read_bytes()
     for version, count in ((2, 44), (3, 75)):
-        assert len(set(names.FUNCTIONS[version])) == count
-        for name in names.FUNCTIONS[version]:
+        assert len(set(standard_names.FUNCTIONS[version])) == count
+        for name in standard_names.FUNCTIONS[version]:
             assert f"fmi{version}{name}\0".encode() in content
     assert b"Py_" not in content
     assert b"_Py" not in content
 
 
 def test_the_library_needs_no_newer_glibc_than_the_documentation_says() -> None:
-    from armrs.fmu.libraries import library
+    from armrs.fmu.bundled_libraries import library
 
     found = re.findall(rb"\0GLIBC_(\d+)\.(\d+)", library().read_bytes())
     if not found:
@@ -335,7 +335,7 @@ def test_an_archive_cannot_write_outside(name: str, folder: Path, tmp_path: Path
 
 def test_a_library_that_crashes_is_a_finding(folder: Path, tmp_path: Path) -> None:
     source = tmp_path / "crash.c"
-    body = "\n".join(f"int fmi3{name}(void) {{ return 0; }}" for name in names.FUNCTIONS[3] if name != "InstantiateCoSimulation")
+    body = "\n".join(f"int fmi3{name}(void) {{ return 0; }}" for name in standard_names.FUNCTIONS[3] if name != "InstantiateCoSimulation")
     source.write_text(f"#include <stdlib.h>\n{body}\nvoid *fmi3InstantiateCoSimulation(void) {{ abort(); }}\n", encoding="utf-8")
     library = tmp_path / "crash.so"
     try:

@@ -16,11 +16,11 @@ import pytest
 
 import fmu_defects
 from armrs import cli
-from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.fmu_export import export_fmu
+from armrs.demo import true_model
 from armrs.errors import BadInput, SlaveError
 from armrs.fmu.check import check_fmu
-from armrs.fmu.export import export_fmu
-from armrs.workflows.demo import true_model
+from armrs.fmu.imported_slave import ImportedSlave
 
 CASES = [(fmi, name) for fmi in (2, 3) for name in (*fmu_defects.BOTH, *(fmu_defects.TWO if fmi == 2 else fmu_defects.THREE))]
 NEEDS_COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.fmu_export import export_fmu
 from armrs.errors import SlaveError
 from armrs.fmu.check import check_fmu
 from armrs.fmu.description import read_description
-from armrs.fmu.export import export_fmu
+from armrs.fmu.imported_slave import ImportedSlave
 from armrs.model import Contact, Effect, Joint, Model, Segment
 
 ARM = Model(

@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.library import library_path
+from armrs.cosim.fmu_export import export_fmu
+from armrs.demo import true_model
 from armrs.fmu.archive import unpack
+from armrs.fmu.bundled_libraries import PLATFORMS
 from armrs.fmu.description import read_description
-from armrs.fmu.export import export_fmu
-from armrs.fmu.libraries import PLATFORMS
-from armrs.workflows.demo import true_model
+from armrs.fmu.shared_library import library_path
 
 SOURCE = Path(__file__).parent / "importer.c"
 WINE = SOURCE.parents[1] / "scripts" / "wine" / "run.sh"

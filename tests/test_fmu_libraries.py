@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from armrs import __version__, cli
-from armrs.cosim.library import platform_folder
+from armrs.cosim.fmu_export import export_fmu
+from armrs.demo import true_model
 from armrs.errors import BadInput
-from armrs.fmu import libraries
-from armrs.fmu.export import export_fmu
-from armrs.fmu.libraries import PLATFORMS, Platform
-from armrs.workflows.demo import true_model
+from armrs.fmu import bundled_libraries
+from armrs.fmu.bundled_libraries import PLATFORMS, Platform
+from armrs.fmu.shared_library import platform_folder
 
 ARM = Path(__file__).parents[1] / "examples" / "cosim" / "arm.toml"
 MACHINES = ["x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin"]
@@ -89,7 +89,7 @@ def test_a_package_with_the_library_of_another_machine_is_refused(folder: Path, 
     if here not in PLATFORMS:
         pytest.skip(f"no folder {here}")
     other = MACHINES[MACHINES.index(here) - 1]
-    monkeypatch.setattr(libraries, "library", lambda: folder / other / PLATFORMS[other].file)
+    monkeypatch.setattr(bundled_libraries, "library", lambda: folder / other / PLATFORMS[other].file)
     with pytest.raises(BadInput, match=f"a file for another machine, allowed a library for {here}"):
         export_fmu(true_model(), tmp_path / "arm.fmu")
     assert not (tmp_path / "arm.fmu").exists()
@@ -124,7 +124,7 @@ def test_a_folder_without_libraries_is_refused(folder: Path, tmp_path: Path) -> 
 
 
 def test_fmi_2_is_refused_on_a_machine_without_a_folder(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(libraries, "library", lambda: folder / "aarch64-linux" / "libarm_fmu.so")
+    monkeypatch.setattr(bundled_libraries, "library", lambda: folder / "aarch64-linux" / "libarm_fmu.so")
     monkeypatch.setattr("platform.machine", lambda: "aarch64")
     monkeypatch.setattr("sys.platform", "linux")
     with pytest.raises(BadInput, match=r"FMI 2\.0 has no folder for libraries of aarch64-linux"):

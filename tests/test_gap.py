@@ -17,10 +17,11 @@ from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.model import AddedMass
 from armrs.report import plotting
-from armrs.workflows.gap import calibrate, compare, figures
-from armrs.workflows.gap.results import gap_data, write_gap
-from armrs.workflows.gap.shapes import portrait
-from armrs.workflows.gap.suspicion import _still_joints, examine, refuse_mislabelled
+from armrs.report.gap import figures
+from armrs.report.gap.result_files import gap_data, write_gap
+from armrs.workflows.gap import calibrate, compare
+from armrs.workflows.gap.data_checks import _still_joints, examine, refuse_mislabelled
+from armrs.workflows.gap.effect_curves import effect_curve
 from browser import opened
 from gap_sessions import session, session_of_three_joints
 from markup import unescaped
@@ -89,7 +90,7 @@ def test_of_each_round_one_contender_is_blue(viscous: armrs.GapFound) -> None:
 
 
 def test_what_one_effect_does_is_that_of_its_law(viscous: armrs.GapFound) -> None:
-    seen = portrait(viscous, viscous.effects[0])
+    seen = effect_curve(viscous, viscous.effects[0])
     value = viscous.effects[0].parameters["viscosity"]
     assert seen.against == "speed"
     assert seen.torque is not None

@@ -13,11 +13,11 @@ import armrs
 from armrs._armrs import ChannelGap, Missing, verdict_of
 from armrs.catalogue import catalogue
 from armrs.cli.analysis import after_gap
-from armrs.workflows.demo import handed_over, true_model
-from armrs.workflows.gap.headline import amount, headline, still_open, undecided
-from armrs.workflows.gap.results import formula_of
-from armrs.workflows.gap.summary import marks, rivals
-from armrs.workflows.gap.words import calibration, gap, heading, intervals, left, missing, named, nearest, others, quick, show, tie
+from armrs.demo import given_model, true_model
+from armrs.report.gap.headline import amount, headline, still_open, undecided
+from armrs.report.gap.result_files import formula_of
+from armrs.report.gap.sentences import calibration, gap, heading, intervals, left, missing, named, nearest, others, quick, show, tie
+from armrs.report.gap.summary_figure import marks, rivals
 
 
 def channel(before: float, calibrated: float, after: float, floor: float | None) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def session(subject: armrs.Subject | None = None, **channels: np.ndarray) -> arm
     """Return a data set of a mechanical arm with one test trial, or that of a subject."""
     t = np.linspace(0.0, 1.0, 30)
     trial = armrs.Trial("trials/a_2.csv", "a", 2, "test", t, np.column_stack([t, t]), **channels)
-    model = handed_over(true_model())
+    model = given_model(true_model())
     return armrs.Dataset("arm", model, (trial,), folder=Path("s"), subject=subject or armrs.Subject())
 
 
@@ -199,7 +199,7 @@ def test_what_is_not_decided_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> N
     assert headline(result("explained", torn)).startswith(
         "Missing from the model is Coulomb friction or viscous damping in joint 1 (shoulder), which these movements cannot distinguish: with it, "
     )
-    monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
+    monkeypatch.setattr("armrs.report.gap.headline.family", lambda kind: "dry")
     one_family = headline(result("explained", {**torn, "alternatives": [{**rival, "kind": "stribeck"}]}))
     assert one_family.startswith(
         "Missing from the model is dry friction in joint 1 (shoulder) (Coulomb friction or Stribeck friction: not distinguished): with it, "
@@ -223,7 +223,7 @@ def test_many_effects_are_named_by_kind(monkeypatch: pytest.MonkeyPatch) -> None
     assert said.startswith(
         "Missing from the model are 4 effects (elastic spring in joints 1, 2 and 3; Coulomb friction in joint 2): with them, "
     )
-    monkeypatch.setattr("armrs.workflows.gap.headline.family", lambda kind: "dry")
+    monkeypatch.setattr("armrs.report.gap.headline.family", lambda kind: "dry")
     torn = {**DRY, "decided": False, "alternatives": [{"kind": "stribeck", "joint": 2, "channel": None}]}
     said = headline(result("explained", *springs, torn))
     assert "joints 1, 2 and 3; dry friction in joint 2 (Coulomb friction or Stribeck friction: not distinguished)): with them, " in said

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import armrs
-from armrs.montecarlo.spec import load_sweep
+from armrs.montecarlo.sweep_file import load_sweep
 from armrs.workflows.record import measure
 
 SWEEP = Path(__file__).parents[1] / "bench" / "sweep" / "little_known" / "SWEEP.toml"

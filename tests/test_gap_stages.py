@@ -19,8 +19,9 @@ from armrs.catalogue import catalogue
 from armrs.errors import BadInput
 from armrs.io.dataset import Dataset, write_dataset
 from armrs.report import plotting
-from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, figures, moving, separate, separating
-from armrs.workflows.gap.results import gap_data, write_gap
+from armrs.report.gap import animation, figures
+from armrs.report.gap.result_files import gap_data, write_gap
+from armrs.workflows.gap import Alternative, calibrate, compare, confirm, detectable, discriminating_movements, separate
 from gap_sessions import model, session
 
 VISCOUS = armrs.Effect("viscous", 2, parameters={"viscosity": 0.4})
@@ -198,7 +199,7 @@ def test_what_swings_with_the_same_phase_in_every_trial_is_seen(
     for name, value in parameters.items():
         assert name == "phase" or found[name] == pytest.approx(value, rel=0.1), name
     # The page switches it off, whether it acts in a joint or at the base.
-    series = moving.moving(result).series
+    series = animation.moving(result).series
     assert series is not None
     for panel in series["panels"]:
         line = {line["name"].partition(" in joint")[0]: np.array(line["values"], dtype=float) for line in panel["lines"]}
@@ -328,8 +329,8 @@ def test_the_named_effect_acts_once_where_movements_are_foretold(found: armrs.Ga
 
     rival = Alternative("coulomb", 2, None, "", 1.0, 0.9, simulated=armrs.Effect("coulomb", 2, parameters={"torque": 0.1}), free=[0])
     torn = found.result.replace(effects=[found.effects[0].replace(alternatives=[rival])])
-    family = separating._family(found)
-    monkeypatch.setattr(separating, "_family", lambda result: family)
+    family = discriminating_movements._family(found)
+    monkeypatch.setattr(discriminating_movements, "_family", lambda result: family)
     monkeypatch.setattr(_armrs, "Rig", seen)
     separate(dataclasses.replace(found, result=torn), threads=2)
     # The law that the joint states, and the named effect beside it.

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs.analysis.quantities import value_in
+from armrs import demo
+from armrs.analysis.quantity_expressions import value_in
 from armrs.catalogue import catalogue
 from armrs.cli import main
-from armrs.workflows import demo, identify
-from armrs.workflows.demo import BRAKES
+from armrs.demo import BRAKES
+from armrs.workflows import identify
 
 # DFKI double pendulum, design A.0, published_design_A.0_model_2.0.yml: m2·r2, and m1·r1 + m2·l1.
 DFKI_M2L2 = 0.6043459469186889 * 0.18377686083653508
@@ -298,7 +299,7 @@ def test_the_rest_angle_of_a_spring_is_an_unknown() -> None:
         armrs.Trial(f"{k}.csv", "large", k, "fit", read.time, read.q, read.force_on_arm, None, read.robot_q)
         for k, read in enumerate(run.readings, start=1)
     ]
-    found = armrs.identify(armrs.Dataset("spring", demo.handed_over(truth), tuple(trials), "robot", synthetic=True), with_effects="elastic")
+    found = armrs.identify(armrs.Dataset("spring", demo.given_model(truth), tuple(trials), "robot", synthetic=True), with_effects="elastic")
     elbow = {e.name: e for e in found.parameters if (e.kind, e.joint) == ("elastic", 2)}
     assert elbow["stiffness"].value == pytest.approx(1.5, abs=3.0 * elbow["stiffness"].std) and elbow["stiffness"].std < 0.1
     assert elbow["rest"].value == pytest.approx(0.8, abs=3.0 * elbow["rest"].std) and elbow["rest"].std < 0.2

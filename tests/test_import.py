@@ -16,7 +16,7 @@ from armrs import cli
 from armrs.errors import BadInput, BadInputs
 from armrs.io.raw import RawTable
 from armrs.io.raw.table import column
-from armrs.workflows.importing import trials
+from armrs.workflows.importing import file_roles
 
 SEGMENTS = (armrs.Segment("upper arm", 0.322, 2.114, 0.186, 0.0165), armrs.Segment("forearm", 0.264, 1.264, 0.121, 0.0074))
 JOINTS = (armrs.Joint("shoulder", stiffness=0.6, rest=-0.9, viscosity=0.15), armrs.Joint("elbow", stiffness=0.4, rest=0.7, viscosity=0.1))
@@ -284,9 +284,9 @@ def test_a_recording_becomes_the_true_data_set(case: str, recording: Recording, 
 
 def test_a_group_of_hdf5_is_a_trial(recording: Recording, tmp_path: Path) -> None:
     done = armrs.import_recordings([hdf5_groups(recording, tmp_path)], tmp_path / "session", model=KNOWN)
-    trials = armrs.load_dataset(done.folder).trials
-    assert [(t.configuration, t.repeat, len(t)) for t in trials] == [("slow", 1, len(recording.t)), ("slow", 2, len(recording.t) + 1)]
-    for trial in trials:
+    written = armrs.load_dataset(done.folder).trials
+    assert [(t.configuration, t.repeat, len(t)) for t in written] == [("slow", 1, len(recording.t)), ("slow", 2, len(recording.t) + 1)]
+    for trial in written:
         assert np.abs(trial.q[: len(recording.t)] - recording.q).max() <= 1e-12
 
 
@@ -297,8 +297,8 @@ def test_a_struct_of_matlab_is_a_trial_as_a_group_of_hdf5_is(within: bool, recor
 
     r = recording
     fields = {"t": r.t, "q": r.q, "Fy": r.force_on_robot[:, 0], "Fz": r.force_on_robot[:, 1]}
-    trials = {"slow_1": fields, "slow_2": {name: column[:-1] for name, column in fields.items()}}
-    savemat(tmp_path / "session.mat", {"session": trials} if within else trials)
+    both = {"slow_1": fields, "slow_2": {name: column[:-1] for name, column in fields.items()}}
+    savemat(tmp_path / "session.mat", {"session": both} if within else both)
     done = armrs.import_recordings([tmp_path / "session.mat"], tmp_path / "session", model=KNOWN)
     found = armrs.load_dataset(done.folder).trials
     assert [(t.configuration, t.repeat, len(t)) for t in found] == [("slow", 1, len(r.t)), ("slow", 2, len(r.t) - 1)]
@@ -488,7 +488,7 @@ def test_the_name_of_a_movement_keeps_its_letters(recording: Recording) -> None:
     columns = tuple(
         column(name, values) for name, values in zip(SI, np.column_stack([recording.t, recording.q, recording.q]).T, strict=True)
     )
-    named, left, _ = trials.arrange([RawTable(Path(f"{title}.csv"), title, columns, ()) for title in expected])
+    named, left, _ = file_roles.arrange([RawTable(Path(f"{title}.csv"), title, columns, ()) for title in expected])
     assert [(n.configuration, n.repeat) for n in named] == list(expected.values()) and not left
 
 
@@ -512,20 +512,20 @@ def _bare(title: str, channels: str) -> RawTable:
 )
 def test_forces_in_files_of_their_own_keep_the_repeats(angles: tuple[str, ...], forces: tuple[str, ...], expected: list[object]) -> None:
     """Words of what was measured, and of the device, made each file a movement of its own."""
-    named, left, _ = trials.arrange([*(_bare(a, "angles") for a in angles), *(_bare(f, "forces") for f in forces)])
+    named, left, _ = file_roles.arrange([*(_bare(a, "angles") for a in angles), *(_bare(f, "forces") for f in forces)])
     assert [(n.configuration, n.repeat) for n in named] == expected and not left
     assert [n.forces and n.forces.title for n in named] == list(forces)
 
 
 def test_a_word_of_the_role_is_no_movement() -> None:
     """`slow_3_test` was the movement `slow-3-test`, beside which `slow` had two repeats; `Test 1` and `Test 2` were all kept apart."""
-    named, _, why = trials.arrange([_bare(t, "both") for t in ("slow_1", "slow_2", "slow_3_test", "fast_1", "fast_2_probe")])
+    named, _, why = file_roles.arrange([_bare(t, "both") for t in ("slow_1", "slow_2", "slow_3_test", "fast_1", "fast_2_probe")])
     found = [(n.configuration, n.repeat, n.role) for n in named]
     expected = [("slow", 1, "fit"), ("slow", 2, "fit"), ("slow", 3, "test"), ("fast", 1, "fit"), ("fast", 2, "test")]
     assert (found, why) == (expected, "from the names of the files")
-    named, _, _ = trials.arrange([_bare(t, "both") for t in ("Test 1", "Test 2", "Test 3")])
+    named, _, _ = file_roles.arrange([_bare(t, "both") for t in ("Test 1", "Test 2", "Test 3")])
     assert [(n.configuration, n.repeat, n.role) for n in named] == [("test", 1, "fit"), ("test", 2, "fit"), ("test", 3, "test")]
-    named, _, _ = trials.arrange(
+    named, _, _ = file_roles.arrange(
         [*(_bare(t, "angles") for t in ("slow_1", "slow_2_test")), *(_bare(f"slow_{k}_kraft", "forces") for k in (1, 2))]
     )
     assert [(n.repeat, n.role, n.forces and n.forces.title) for n in named] == [(1, "fit", "slow_1_kraft"), (2, "test", "slow_2_kraft")]

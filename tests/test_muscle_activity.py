@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs.analysis import repeated
+from armrs.analysis import repeat_statistics
 from armrs.io.muscle_activity import _applied, co_contraction, comparable, joint_activity, mark_activity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
@@ -192,7 +192,7 @@ def test_a_gap_is_completed_by_the_shape_of_all_repeats_at_the_level_of_each() -
     whole = shape + levels[:, None]
     values = whole.copy()
     values[0, 3:8] = values[1, 12:] = values[2, 15] = np.nan
-    completed = repeated.completed(values, np.array([True, True, False]))
+    completed = repeat_statistics.completed(values, np.array([True, True, False]))
     np.testing.assert_allclose(completed[:2], whole[:2], atol=1e-6)
     assert np.isnan(completed[2, 15])
 

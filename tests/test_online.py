@@ -12,14 +12,14 @@ import pytest
 
 import armrs
 from armrs import online
+from armrs.demo import given_model, true_model
 from armrs.io.samples import write_samples
 from armrs.online.estimator import STATUSES
-from armrs.workflows.demo import handed_over, true_model
 from test_export_c import BASE_FLAGS, ROOT, run
 
 PERIOD = 1e-3
 TRUTH = true_model()
-MODEL = handed_over(TRUTH).replace(joints=TRUTH.joints)
+MODEL = given_model(TRUTH).replace(joints=TRUTH.joints)
 """What the device is given: too heavy."""
 
 

@@ -15,10 +15,10 @@ import pytest
 import armrs
 import patients
 import results
-from armrs import cli, online
-from armrs.report import series
+from armrs import cli, demo, online
+from armrs.report import interactive_series
 from armrs.tabular import Tabular
-from armrs.workflows import demo, history
+from armrs.workflows import history
 from browser import faults_on_paper, faults_on_screens, opened
 from results import kinds
 from test_cohort import population, table
@@ -46,7 +46,7 @@ def made(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
         ["workflows.record", "record", "record", str(out / "EXPERIMENT.toml")],
         ["workflows.plan", "plan", "plan", truth, "--angles-deg=-80:-20,30:90", "--evaluations", "20"],
         ["montecarlo", "sweep", "sweep", str(out / "SWEEP.toml"), "--jobs", "1"],
-        ["cosim.accuracy", "run_checked", "fmu", "run", str(out / "cosim" / "wall.toml")],
+        ["cosim.error_estimate", "run_checked", "fmu", "run", str(out / "cosim" / "wall.toml")],
     ):
         place = ["-o", str(out / arguments[0])]
         status, returned = results.behind(importlib.import_module(f"armrs.{module}"), function, *arguments, *place)
@@ -71,7 +71,7 @@ def made(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
     sessions.report(out / "history" / "report.html")
     moved = armrs.simulate(demo.true_model(), duration=3.0, start=[-1.0, 0.6], rate=1000.0)
     device = online.Log(moved.t, moved.q, moved.force_on_arm)
-    replayed = online.replay(device, demo.handed_over(demo.true_model()), every=10)
+    replayed = online.replay(device, demo.given_model(demo.true_model()), every=10)
     replayed.report(out / "replay" / "report.html")
     result = armrs.find_gap(demo.measure_two_speeds(demo.true_model()), separate=False)
     (out / "gap").mkdir()
@@ -350,7 +350,7 @@ def test_what_moves_is_refused_when_it_is_not_whole(pages: Path, tmp_path: Path,
 def test_a_long_line_keeps_its_peaks() -> None:
     t = np.linspace(0.0, 100.0, 50_001)
     values = np.where(np.arange(len(t)) == 31_234, 7.0, np.sin(t))
-    thinned = series.series("", "", t, [series.Panel("", "", (series.Line("a", "#000", values),))])
+    thinned = interactive_series.series("", "", t, [interactive_series.Panel("", "", (interactive_series.Line("a", "#000", values),))])
     line = thinned["panels"][0]["lines"][0]["values"]
-    assert len(line) == len(thinned["t_s"]) <= series.MOST_SAMPLES
+    assert len(line) == len(thinned["t_s"]) <= interactive_series.MOST_SAMPLES
     assert (max(line), min(line)) == (7.0, pytest.approx(-1.0, abs=1e-4))

@@ -13,7 +13,7 @@ import pytest
 import armrs
 from armrs import cli
 from armrs.analysis.passivity_checks import gives_energy
-from armrs.workflows.demo import BRAKES
+from armrs.demo import BRAKES
 from conftest import Session
 
 FRICTION = 0.01

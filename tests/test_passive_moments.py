@@ -12,7 +12,7 @@ import pytest
 import armrs
 from armrs import Dataset, Trial
 from armrs.analysis import passivity_checks, uncertainty
-from armrs.analysis.double_exponential import Course
+from armrs.analysis.double_exponential import MomentCurve
 from armrs.analysis.joint_coupling import fit
 from armrs.workflows import passive
 
@@ -67,7 +67,7 @@ def test_no_coupling_is_made_of_configurations_that_scatter_differently(held: tu
     found = 0
     for _ in range(120):
         courses = [
-            Course(q, 0.8 * q + s * draw.standard_normal(), np.radians(a), str(a))
+            MomentCurve(q, 0.8 * q + s * draw.standard_normal(), np.radians(a), str(a))
             for a, s in zip(held, scatter, strict=True)
             for _ in range(6)
         ]
@@ -88,7 +88,7 @@ def test_the_spring_of_a_joint_is_no_coupling() -> None:
             for shoulder, elbow in np.radians([(-60, 60), (-45, 40), (-30, 20)]):
                 q = elbow + np.linspace(0.0, 0.2, 12)
                 levels = 0.002 * draw.standard_normal((3, 1)) + 0.01 * draw.standard_normal((3, q.size))
-                courses += [Course(q, 0.8 * q + coupling * shoulder + level, float(shoulder), f"{shoulder}") for level in levels]
+                courses += [MomentCurve(q, 0.8 * q + coupling * shoulder + level, float(shoulder), f"{shoulder}") for level in levels]
             fitted = fit(courses, 2, 1)
             assert fitted is not None
             found[coupling] += fitted.coupled
@@ -131,7 +131,7 @@ def test_a_line_needs_no_exponential() -> None:
     draw = np.random.default_rng(5)
     q = np.linspace(0.4, 1.5, 20)
     courses = [
-        Course(q, 0.8 * q + 0.3 * a + 0.2 * draw.standard_normal() + 0.02 * draw.standard_normal(20), a, str(a))
+        MomentCurve(q, 0.8 * q + 0.3 * a + 0.2 * draw.standard_normal() + 0.02 * draw.standard_normal(20), a, str(a))
         for a in (-1.0, 0.0, 1.0) * 5
     ]
     fitted = fit(courses, 2, 1)
@@ -139,7 +139,7 @@ def test_a_line_needs_no_exponential() -> None:
     assert [fitted[name].value for name in ("upper", "lower", "upper_steepness", "lower_ratio")] == [0.0] * 4 and fitted.linear
     assert fitted["stiffness"].value == pytest.approx(0.8, abs=0.02)
     assert fit(courses[:3], 2, 1) is None
-    assert fit([Course(c.angle, c.moment, 0.5, "one") for c in courses], 2, 1) is None
+    assert fit([MomentCurve(c.angle, c.moment, 0.5, "one") for c in courses], 2, 1) is None
 
 
 def test_jacobian_and_monte_carlo_agree(session: Dataset, result: passive.PassiveMoments) -> None:
@@ -178,8 +178,8 @@ def test_muscles_that_wake_up_are_seen() -> None:
 
 
 def test_the_result_says_it_all(session: Dataset, tmp_path: Path) -> None:
-    from armrs.report.plain import passive_data
-    from armrs.report.results import write_passive
+    from armrs.report.result_files import write_passive
+    from armrs.workflows.result_data import passive_data
 
     result = armrs.passive_moments(session)
     data = passive_data(result)

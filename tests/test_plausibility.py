@@ -13,11 +13,11 @@ import pytest
 import armrs
 from armrs import BadInput
 from armrs.cli import main
-from armrs.io import readings
+from armrs.demo import true_model
+from armrs.io import column_conventions
 from armrs.io.plausibility import hand_path, refuse_implausible
-from armrs.workflows.checking import grouped
-from armrs.workflows.demo import true_model
-from armrs.workflows.importing.handle import robot_angles
+from armrs.workflows.check_dataset import grouped
+from armrs.workflows.importing.handle_positions import robot_angles
 
 FIRST = "trials/slow_1.csv"
 
@@ -125,9 +125,9 @@ def test_a_dead_sensor_is_one_problem(slow_arm: Path, tmp_path: Path) -> None:
 
 
 def test_without_a_robot_another_zero_of_an_angle_that_never_changes_may_be_a_dead_sensor() -> None:
-    allowed = readings.other_zero(2, 2, -0.9, still=True).allowed
+    allowed = column_conventions.other_zero(2, 2, -0.9, still=True).allowed
     assert "a dead sensor?" in allowed and "if the joint is held, q2 is 0.9 rad too large" in allowed
-    mirrored = next(r for r in readings.of_angles(2) if r.place == "column q2" and "mirrored" in r.allowed)
+    mirrored = next(r for r in column_conventions.of_angles(2) if r.place == "column q2" and "mirrored" in r.allowed)
     angles = np.array([[0.1, 0.0], [0.2, 0.0]])
     assert mirrored.differs(angles + 0.1) and not mirrored.differs(angles)  # 0 has no side
 

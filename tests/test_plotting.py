@@ -10,11 +10,10 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from armrs import plotting
+from armrs import demo, formatting, plotting
 from armrs.io.trial import Trial
-from armrs.report import figures, tables
+from armrs.report import figures
 from armrs.report.sketch import sketch
-from armrs.workflows import demo
 
 T = np.linspace(0.0, 2.0, 101)
 
@@ -82,7 +81,7 @@ def test_the_legend_of_intervals_explains_what_occurs() -> None:
 
 
 def test_symbols_tell_i_from_l() -> None:
-    assert tables.typeset("I1 + m1*l1^2") == "I₁ + m₁·ℓ₁²"
+    assert formatting.typeset("I1 + m1*l1^2") == "I₁ + m₁·ℓ₁²"
 
 
 def test_angles_are_in_degrees(ax: matplotlib.axes.Axes) -> None:

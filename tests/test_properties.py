@@ -13,9 +13,9 @@ import pytest
 
 from armrs._armrs import verdict_of
 from armrs.io import tomlfile
-from armrs.io.raw.text import decoded_lines, table_of
+from armrs.io.raw.text_table import decoded_lines, table_of
 from armrs.io.samples import read_samples, write_samples
-from armrs.report import html, series
+from armrs.report import html, interactive_series
 
 hypothesis = pytest.importorskip("hypothesis")
 st = hypothesis.strategies
@@ -81,10 +81,12 @@ def test_toml_comes_back_as_it_was_written(table: dict[str, object]) -> None:
 @hypothesis.given(values=st.lists(FINITE, min_size=2, max_size=60), repeats=st.integers(1, 200))
 def test_thinned_lines_keep_both_ends_of_what_they_show(values: list[float], repeats: int) -> None:
     course = np.tile(np.array(values), repeats)
-    made = series.series("", "", np.arange(len(course)) * 0.01, [series.Panel("", "", (series.Line("a", "#000", course),))])
+    made = interactive_series.series(
+        "", "", np.arange(len(course)) * 0.01, [interactive_series.Panel("", "", (interactive_series.Line("a", "#000", course),))]
+    )
     line = made["panels"][0]["lines"][0]["values"]
-    assert len(line) == len(made["t_s"]) <= max(series.MOST_SAMPLES + 2, 2)
-    rounded = [float(f"{v:.{series.DIGITS}g}") for v in (course.min(), course.max())]
+    assert len(line) == len(made["t_s"]) <= max(interactive_series.MOST_SAMPLES + 2, 2)
+    rounded = [float(f"{v:.{interactive_series.DIGITS}g}") for v in (course.min(), course.max())]
     assert [min(line), max(line)] == rounded
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from armrs import Effect, Joint, Model, Segment
-from armrs.analysis.quantities import value_in
+from armrs.analysis.quantity_expressions import value_in
 
 MODEL = Model(
     segments=(

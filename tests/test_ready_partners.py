@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 from armrs import cli
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.ready import Impedance, Pid, Ready, Wave
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.sources_and_controllers import BuiltInSlave, Impedance, Pid, Wave
 from armrs.cosim.system import couple, load_system
 from armrs.errors import BadInput
 from armrs.model import Contact, Joint, Model, Segment
@@ -142,7 +142,7 @@ def test_what_a_ready_partner_cannot_be_is_refused(table: str, message: str, tmp
 
 
 def test_names_with_dots_quotes_and_letters_beyond_ascii_are_ends_of_connections() -> None:
-    class Quoted(Ready):
+    class Quoted(BuiltInSlave):
         def __init__(self) -> None:
             super().__init__("my.größe", [("'länge ü.x'.r[1]", "m"), ("'länge ü.x'.r[2]", "m")], [("öl", "m")])
 

@@ -14,7 +14,7 @@ import pytest
 
 import armrs
 from armrs import BadInput, cli
-from armrs.workflows.demo import true_model
+from armrs.demo import true_model
 from armrs.workflows.passive import passive_moments
 
 

@@ -13,7 +13,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from armrs import cli
-from armrs.thesis.people import TABLE_4_10
+from armrs.thesis.simulated_arms import TABLE_4_10
 from browser import OF_COLOURS, ONE_OF_A_KIND, WIDTHS, faults_on_paper, faults_on_screens, opened, violations
 
 pytestmark = pytest.mark.long

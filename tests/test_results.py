@@ -14,8 +14,9 @@ import pytest
 
 import armrs
 from armrs import BadInput, _armrs
+from armrs.formatting import symbol
 from armrs.io import files
-from armrs.report.tables import label, symbol
+from armrs.report.tables import label
 
 CLASSES: dict[str, dict[str, Any]] = {
     "Value": {"value": 0.4, "std": 0.01, "unit": "N m s/rad", "interval": (0.38, 0.42)},

@@ -16,7 +16,7 @@ import pytest
 
 import armrs
 from armrs import cli
-from armrs.cosim.process import Confined, ProcessEnded
+from armrs.fmu.confined_process import Confined, ProcessEnded
 from armrs.io import files, tomlfile
 from conftest import MODEL
 

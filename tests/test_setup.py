@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import armrs
-from armrs.analysis.balance import motion_of, unexplained
+from armrs.analysis.torque_balance import motion_of, unexplained
 from armrs.cli import main
-from armrs.io import readings
+from armrs.io import column_conventions
 from armrs.io.samples import read_samples, write_samples
-from armrs.workflows.setup import examine_setup
+from armrs.workflows.setup_check import examine_setup
 
 Table = dict[str, np.ndarray]
 
@@ -119,10 +119,10 @@ def test_check_names_a_wrong_setup_and_the_one_trial_that_is_wrong(session: Path
     assert [text.partition(":")[0] for text in texts] == ["trials/round_2.csv"]
 
 
-def every_reading() -> Iterator[readings.Reading]:
-    yield from readings.of_angles(3)
-    yield from readings.of_forces(3)
-    yield readings.other_zero(3, 2, 0.6)
+def every_reading() -> Iterator[column_conventions.AlternativeConvention]:
+    yield from column_conventions.of_angles(3)
+    yield from column_conventions.of_forces(3)
+    yield column_conventions.other_zero(3, 2, 0.6)
 
 
 @pytest.mark.parametrize("session", ["without"], indirect=True)
@@ -150,7 +150,7 @@ def test_every_reading_is_undone_by_itself(session: Path) -> None:
     assert right < 0.02
     for reading in every_reading():
         turn = np.linalg.inv(reading.turn)
-        undone = readings.Reading("", "", turn, -turn @ reading.shift, np.linalg.inv(reading.force))
+        undone = column_conventions.AlternativeConvention("", "", turn, -turn @ reading.shift, np.linalg.inv(reading.force))
         # The forces depend little on the angle of the hand: there a warning has to do.
         least = 1.2 if reading.place == "column q3" else 2.0
         assert unexplained(data.model, motion.read_as(undone)) > least * right

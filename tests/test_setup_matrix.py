@@ -14,7 +14,7 @@ import pytest
 import armrs
 from armrs.io.dataset import Dataset
 from armrs.io.plausibility import refuse_implausible
-from armrs.workflows.setup import examine_setup
+from armrs.workflows.setup_check import examine_setup
 from gap_sessions import session as gap_session
 
 pytestmark = pytest.mark.long

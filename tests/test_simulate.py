@@ -20,15 +20,15 @@ from pyarrow import parquet
 
 import armrs
 from armrs import cli
+from armrs.demo import true_model
 from armrs.errors import BadInput
 from armrs.io.files import json_text
 from armrs.io.samples import write_samples
 from armrs.report import figures
-from armrs.report.plain import simulated_data
-from armrs.report.results import simulated_columns
-from armrs.workflows.demo import true_model
+from armrs.report.result_files import simulated_columns
+from armrs.workflows.result_data import simulated_data
 from armrs.workflows.simulate import PIECE
-from armrs.workflows.streamed import stream
+from armrs.workflows.streamed_simulation import stream
 from conftest import MODEL
 
 

@@ -12,11 +12,11 @@ import pytest
 
 from armrs import Joint, Model, simulate
 from armrs.cosim import Partner, Slave, Status
-from armrs.cosim.imported import ImportedSlave
+from armrs.cosim.fmu_export import export_fmu
+from armrs.demo import true_model
 from armrs.errors import BadInput, SlaveError
-from armrs.fmu.export import export_fmu
+from armrs.fmu.imported_slave import ImportedSlave
 from armrs.model import Contact, Effect, Segment
-from armrs.workflows.demo import true_model
 
 KINDS = ("python", "fmi2", "fmi3")
 START = np.radians([-60.0, 50.0])
@@ -287,7 +287,7 @@ def test_a_state_goes_into_a_new_process(files: dict[tuple[str, str], Path], tmp
         slave.free_state(state)
         once = run(slave, 0.01, 10, first=10)
     script = (
-        "import sys; sys.path.insert(0, sys.argv[3]); from pathlib import Path; from armrs.cosim.imported import ImportedSlave; from test_slave import run\n"
+        "import sys; sys.path.insert(0, sys.argv[3]); from pathlib import Path; from armrs.fmu.imported_slave import ImportedSlave; from test_slave import run\n"
         "with ImportedSlave(sys.argv[1]) as s:\n"
         "    state = s.deserialize_state(Path(sys.argv[2]).read_bytes()); s.set_state(state); s.free_state(state)\n"
         "    print(run(s, 0.01, 10, first=10))"

@@ -16,7 +16,7 @@ from armrs import BadInput
 from armrs.cli import main
 from armrs.io.muscle_activity import onset
 from armrs.model import Effect, Model
-from armrs.report import clinic_results, plotting
+from armrs.report import clinic_figures, plotting
 from armrs.workflows.plan import Instruments, Limits
 from armrs.workflows.plan_stretches import plan_stretches
 from patients import Patient
@@ -130,6 +130,6 @@ def test_markers_at_the_axis_are_whole() -> None:
     slow = SimpleNamespace(speed=0.2, peak_moment=1.5, elastic=1.4, resisting=0.1, reflex=0.0, catch_angle=np.nan, catch_speed=np.nan)
     found = SimpleNamespace(joint=1, stretches=[slow], reflex=SimpleNamespace(found=False))
     with plotting.style():
-        left = clinic_results._stretches(None, found, "elbow").figure.axes[0]  # type: ignore[arg-type]
+        left = clinic_figures._stretches(None, found, "elbow").figure.axes[0]  # type: ignore[arg-type]
     assert min(float(line.get_ydata()[0]) for line in left.lines) == 0.0 == left.get_ylim()[0]
     assert not any(line.get_clip_on() for line in left.lines)

@@ -13,13 +13,15 @@ from matplotlib.colors import rgb_to_hsv, to_hex, to_rgb
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
 import armrs
+from armrs import demo, formatting
 from armrs.analysis import double_exponential
 from armrs.catalogue import catalogue
-from armrs.report import clinic_words, plotting, tables
-from armrs.report import words as common
-from armrs.thesis import simulation
-from armrs.workflows import demo, identify, setup
-from armrs.workflows.gap import figures, maps, words
+from armrs.report import clinic_sentences, plotting, tables
+from armrs.report import sentences as common
+from armrs.report.gap import figures, sentences
+from armrs.thesis import simulation_comparison
+from armrs.workflows import identify, setup_check
+from armrs.workflows.gap import residual_maps
 from armrs.workflows.residuals import Explained, residuals
 from test_docs import ROOT, blocks
 
@@ -48,7 +50,7 @@ def test_documents_count_the_effects_that_are_searched_for() -> None:
 @pytest.mark.parametrize(("after", "closed"), [(0.1, "100 %"), (0.35, "50 %"), (0.2, "100 %")])
 def test_no_more_than_all_of_a_gap_is_closed(after: float, closed: str) -> None:
     """Below what repeats differ by there is nothing to close: `104 %` was printed."""
-    (row,) = words.gap(gap_of(after=after)).rows
+    (row,) = sentences.gap(gap_of(after=after)).rows
     assert closed in row
 
 
@@ -60,11 +62,11 @@ def effect(**more: Any) -> dict[str, Any]:
 def test_the_worth_of_an_effect_is_told_in_units_of_the_scatter() -> None:
     """A share of what is explained was 0 % in most rows of the table of an arm without laws."""
     found = {"effects": [effect(), effect(without=None)], "lack_of_fit": {"amended": {"ratio": 1.21}}}
-    table = words.missing(found)
+    table = sentences.missing(found)
     assert table.head[2] == "residual without the effect" and [row[2] for row in table.rows] == ["3.4", "–"]
-    assert "With every effect it is 1.1." in words.worth(found)
+    assert "With every effect it is 1.1." in sentences.worth(found)
     unrepeated = {"effects": [effect(without=None)], "lack_of_fit": {"amended": {"ratio": None}}}
-    assert words.missing(unrepeated).rows[0][2] == "< 1 %" and "Share: " in words.worth(unrepeated)
+    assert sentences.missing(unrepeated).rows[0][2] == "< 1 %" and "Share: " in sentences.worth(unrepeated)
 
 
 def test_sentences_write_a_value_and_its_interval_in_one_way() -> None:
@@ -77,11 +79,11 @@ def test_sentences_write_a_value_and_its_interval_in_one_way() -> None:
     latency, way = value(0.0402, 0.0021, "s"), {"value": 1.0}
     parameters = {"direction": way, "threshold": threshold, "gain": value(0.5012, 0.02, "N m s/rad"), "latency": latency}
     reflex = {"joint": 1, "decided": True, "parameters": parameters}
-    assert clinic_words.verdict({"verb": "spasticity", "data": {"joints": ["elbow"]}, "effects": [reflex]}) == (
+    assert clinic_sentences.verdict({"verb": "spasticity", "data": {"joints": ["elbow"]}, "effects": [reflex]}) == (
         "elbow: a stretch reflex resists where the angle grows faster than 92 °/s (95 % interval 88 to 95); gain 0.50 N m s/rad "
         "(95 % interval 0.46 to 0.54); latency 40 ms (95 % interval 36 to 44)."
     )
-    assert words.size({"parameters": {"speed": threshold}}) == "speed 92 °/s (95 % interval 88 to 95)"
+    assert sentences.size({"parameters": {"speed": threshold}}) == "speed 92 °/s (95 % interval 88 to 95)"
 
 
 def test_what_is_followed_has_the_names_and_units_of_the_page_it_stands_on() -> None:
@@ -96,7 +98,7 @@ def test_what_is_followed_has_the_names_and_units_of_the_page_it_stands_on() -> 
         ["stretch reflex latency, joint 1", "ms", 3, "39.3 ± 2.0", "+2.0 ± 2.0", "no (p = 0.4)", "+2.0 ± 2.0", "yes (p < 1e-12)"],
     ]
     half_width = {**threshold, "kind": "passive", "name": "half_width in slow_elbow", "unit": "N m"}
-    assert tables.course_label(half_width) == "passive half width, joint 1 in slow_elbow"
+    assert formatting.parameter_label(half_width) == "passive half width, joint 1 in slow_elbow"
     assert len(tables.history([{**threshold, "dates": ["a"], "change": None, "p_value": None}]).head) == 4
 
 
@@ -118,7 +120,7 @@ def test_a_difference_between_groups_has_a_direction() -> None:
 
     found = {"verb": "cohort", "subjects": 12, "sessions": 24, "quantities": [{"name": "half_width in slow"}]}
     found["contrasts"] = [contrast("control", "patient", 0.6, 1e-4), contrast("left", "right", -0.2, 0.01), contrast("a", "b", 1.0, 0.2)]
-    assert clinic_words.verdict(found) == (
+    assert clinic_sentences.verdict(found) == (
         "12 subjects, 24 sessions, 1 quantity. Half width in slow is higher in patient than in control and lower in right than in left "
         "(level of 5 % for all comparisons together)."
     )
@@ -127,7 +129,7 @@ def test_a_difference_between_groups_has_a_direction() -> None:
 def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
     """`+40589.3 standard deviations` and `-0.0` were printed."""
     lack = {"calibrated": {"ratio": 2431.4, "z": 40589.3}, "amended": {"ratio": 0.999, "z": -0.01}}
-    said = words.left(
+    said = sentences.left(
         {"lack_of_fit": lack, "effects": [effect()], "gap": {}, "open": [], "unexplained": {"share": 0.0, "looks_like": None}}
     )
     assert "2430 times" in said[0] and "more than 100 standard deviations" in said[0]
@@ -146,7 +148,7 @@ def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:
         figure.canvas.draw()
     ax = figure.axes[0]
     assert to_hex(ax.get_facecolor()) == to_hex(plotting.FAINT) != "#ffffff"
-    visited = np.isfinite(maps.residual_map([seen, seen], 0).torque)  # type: ignore[list-item]
+    visited = np.isfinite(residual_maps.residual_map([seen, seen], 0).torque)  # type: ignore[list-item]
     white = ax.collections[0].get_facecolor().reshape(*visited.shape, 4)
     assert 0.1 < visited.mean() < 1.0
     assert (white[visited] == 1.0).all() and (white[~visited][:, 3] == 0.0).all()
@@ -155,7 +157,7 @@ def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:
 def test_the_film_names_the_colours_that_it_has() -> None:
     """The arm in #D55E00 was called red."""
     run = armrs.simulate(demo.true_model(), armrs.Movement(np.radians([[-60.0, 60.0], [-58.0, 61.0]]), speed=0.5, acceleration=2.0))
-    film = simulation._film(simulation.Comparison(run, demo.measure_two_speeds), "t")  # type: ignore[arg-type]
+    film = simulation_comparison._film(simulation_comparison.Comparison(run, demo.measure_two_speeds), "t")  # type: ignore[arg-type]
     said = dict(re.findall(r"(robot|arm) \((\w+)\)", str(film["text"])))
     hues = {"orange": (15.0, 45.0), "blue": (190.0, 250.0)}
     colours = {chain["name"]: chain["colour"] for chain in film["chains"]}  # type: ignore[attr-defined]
@@ -318,7 +320,7 @@ def test_what_can_change_together_has_units() -> None:
         "combinations": [],
         "scale_free": False,
     }
-    assert common.cannot_tell(result) == [
+    assert common.not_separable(result) == [
         "m1 does not act on the data.",
         "Changing m2 by 1 kg, m1·l1 by -0.376 kg m and I1 + m1·l1² by -0.1414 kg m² together leaves every measurement unchanged: none is "
         "measured alone.",
@@ -327,8 +329,8 @@ def test_what_can_change_together_has_units() -> None:
 
 def test_a_weight_says_what_its_deviations_count() -> None:
     """`0.46 ± 0.01 times the masses, 5.4 standard deviations from it`: the ± is not that of the model."""
-    assert "0.460 ± 0.010 times the masses" in (said := str(setup.Weight(0.46, 0.01, 5.4)))
-    assert "0.1068 ± 0.0031 times the masses" in str(setup.Weight(0.1068, 0.0031, 8.9))  # it read 0.11 ± 0.00
+    assert "0.460 ± 0.010 times the masses" in (said := str(setup_check.Weight(0.46, 0.01, 5.4)))
+    assert "0.1068 ± 0.0031 times the masses" in str(setup_check.Weight(0.1068, 0.0031, 8.9))  # it read 0.11 ± 0.00
     assert "5.4 standard deviations from one, the model's own uncertainty counted" in said
 
 

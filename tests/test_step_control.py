@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from armrs.cosim import Slave
-from armrs.cosim.accuracy import run_checked
-from armrs.cosim.coupled import Coupled
+from armrs.cosim.coupled_run import CoupledRun
+from armrs.cosim.error_estimate import run_checked
+from armrs.cosim.haptic_wall import Wall
 from armrs.cosim.master import run_system
-from armrs.cosim.pace import Pace
-from armrs.cosim.partner import Partner
-from armrs.cosim.ready import Wave
+from armrs.cosim.sources_and_controllers import Wave
 from armrs.cosim.ssp import load_ssp
 from armrs.cosim.ssp_export import export_ssp
+from armrs.cosim.step_control import StepControl
 from armrs.cosim.system import System, couple, load_system
-from armrs.cosim.wall import Wall
 from armrs.errors import BadInput, CoupledError, SlaveError
+from armrs.fmu.slave_interface import Partner
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "cosim"
 
@@ -32,15 +32,15 @@ def against_a_wall(step: float, shortest: float | None, wall: Partner | None = N
 
 
 @pytest.fixture(scope="module")
-def fine() -> Coupled:
+def fine() -> CoupledRun:
     return run_system(against_a_wall(0.125e-3, None))
 
 
-def off(run: Coupled, fine: Coupled, name: str) -> float:
+def off(run: CoupledRun, fine: CoupledRun, name: str) -> float:
     return float(np.max(np.abs(run.columns[name] - np.interp(run.t, fine.t, fine.columns[name]))))
 
 
-def test_short_steps_are_made_where_they_are_needed(fine: Coupled) -> None:
+def test_short_steps_are_made_where_they_are_needed(fine: CoupledRun) -> None:
     """An arm swings against a wall: one length of 1 ms throughout is no better than 712 steps of 1 to 16 ms."""
     run = run_checked(against_a_wall(0.016, 0.001))
     assert run.verdict == "good"
@@ -69,7 +69,7 @@ def test_without_it_all_steps_are_as_before() -> None:
 @pytest.mark.parametrize("duration", [0.1, 0.1003, 0.0997])
 def test_steps_are_whole_numbers_of_the_shortest(duration: float) -> None:
     system = dataclasses.replace(against_a_wall(0.01, 0.0005), duration=duration)
-    pace = Pace(system)
+    pace = StepControl(system)
     ends = []
     for error in [*np.random.default_rng(1).uniform(0.0, 3.0, 1000)]:
         if (end := pace.end) is None:
@@ -84,7 +84,7 @@ def test_steps_are_whole_numbers_of_the_shortest(duration: float) -> None:
 
 
 def test_a_step_is_shortened_until_there_is_no_shorter_one() -> None:
-    pace = Pace(against_a_wall(0.004, 0.001))
+    pace = StepControl(against_a_wall(0.004, 0.001))
     for _ in range(4):
         pace.go_on(0.0)
     assert pace.end == pytest.approx(pace.begin + 0.004)

@@ -55,11 +55,18 @@ def test_no_circle_of_imports_in_the_package() -> None:
     assert structure.circles(structure.python_imports(PACKAGE)) == []
 
 
+def test_no_circle_between_the_folders_of_the_package() -> None:
+    """Nor through modules directly below it."""
+    folders = structure.folder_imports(PACKAGE)
+    assert {"io", "workflows", "report", "cli", "fmu", "cosim"} <= folders.keys()
+    assert structure.circles(folders) == []
+
+
 LATE = {
     "armrs.__main__": {"armrs.cli"},
     "armrs.catalogue": {"armrs"},
-    "armrs.cosim.worker": {"armrs.fmu.probe", "armrs.cosim.imported"},
-    "armrs.report.words": {"armrs.workflows.plan"},
+    "armrs.fmu.worker": {"armrs.fmu.library_probe", "armrs.fmu.imported_slave"},
+    "armrs.report.sentences": {"armrs.workflows.plan"},
 }
 """Modules beside the commands that import in functions: a command that is interrupted while it loads ends with one line, effects are listed
 where nothing is compiled, a worker loads what its task needs before limits hold, and an old result is shown without what computed it."""
@@ -72,9 +79,9 @@ def test_imports_stand_in_functions_where_starting_asks_for_it_alone() -> None:
 
 
 def test_modules_are_loaded_by_name_in_two_places() -> None:
-    """By the package itself, and by `armrs.views`, the door from results to what draws them: such imports are in no graph."""
+    """By the package itself, and by `armrs.view_registry`, the door from results to what draws them: such imports are in no graph."""
     by_name = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.rglob("*.py") if structure.loads_by_name(p)}
-    assert by_name == {"__init__.py", "views.py"}
+    assert by_name == {"__init__.py", "view_registry.py"}
 
 
 def test_folders_do_not_know_what_is_above_them() -> None:
@@ -84,10 +91,8 @@ def test_folders_do_not_know_what_is_above_them() -> None:
         "cli": {"__main__"},
         "montecarlo": {"cli"},
     }
-    below = {
-        "io": {"io", "model", "checks", "errors", "catalogue", "custom_effects", "views", "anthropometry", "tabular", "telling"},
-        "analysis": {"analysis", "io", "model", "checks", "errors", "catalogue", "tabular"},
-    }
+    shared = {"anthropometry", "catalogue", "checks", "custom_effects", "errors", "model", "result_warnings", "tabular"}
+    below = {"io": {"io", "view_registry", *shared}, "analysis": {"analysis", "io", *shared}}
     for name, used in structure.python_imports(PACKAGE).items():
         room = name.split(".")[1]
         for other in used:
@@ -101,7 +106,7 @@ def test_folders_do_not_know_what_is_above_them() -> None:
 def test_the_path_of_find_gap_does_not_go_back_and_forth() -> None:
     """From the call in Python to the verdict, by what the functions that lead it call themselves."""
     gap = PACKAGE / "workflows" / "gap"
-    asked = [name for part in ("suspicion", "search") for name in re.findall(r"_armrs\.([a-z]\w+)", (gap / f"{part}.py").read_text())]
+    asked = [name for part in ("data_checks", "search") for name in re.findall(r"_armrs\.([a-z]\w+)", (gap / f"{part}.py").read_text())]
     assert asked == ["reach", "play", "find_gap"]
     core = ROOT / "crates" / "arm-gap" / "src"
     folders = structure.folders_of_functions(core)
@@ -166,8 +171,9 @@ NAMED_IN_PYTHON = {
     "io/multibody/mjcf.py": "a fixed tendon is a spring over two joints",
     "io/multibody/osim.py": "the friction that a joint has no key for in OpenSim",
     "io/multibody/urdf.py": "friction of a joint is Coulomb's",
-    "report/clinic.py": "the numbers that a clinician reads, in plain words",
-    "workflows/demo.py": "the brakes that the demo hides",
+    "report/clinic_page.py": "the numbers that a clinician reads, in plain words",
+    "demo/run.py": "the brakes that the demo hides",
+    "demo/session.py": "the brakes that the demo hides",
     "workflows/plan_stretches.py": "stretches are planned for reflexes",
     "workflows/record.py": "a torque that differs between repeats is a constant moment",
     "workflows/spasticity.py": "what is asked is the reflex",
@@ -269,6 +275,18 @@ def test_a_circle_of_python_modules_is_found(tmp_path: Path) -> None:
     tree(tmp_path, {"p/c/d.py": "if TYPE_CHECKING:\n    from ..a import y\ndef f():\n    from ..a import y\n    import sys\n"})
     assert structure.circles(structure.python_imports(package)) == [["p.a", "p.b", "p.c.d"]]
     assert structure.late_imports(package) == {"p.c.d": {"p.a"}}
+
+
+def test_a_circle_between_folders_is_found(tmp_path: Path) -> None:
+    """Also where no module is in a circle, and through a module beside the folders."""
+    files = {f"p/{name}.py": "" for name in ("__init__", "a/__init__", "a/x", "b/__init__", "b/x", "c")}
+    package = tree(tmp_path, {**files, "p/a/y.py": "from ..b.x import f", "p/b/y.py": "from ..a import x"}) / "p"
+    assert structure.circles(structure.python_imports(package)) == []
+    assert structure.circles(structure.folder_imports(package)) == [["a", "b"]]
+    tree(tmp_path, {"p/b/y.py": "from .. import c", "p/c.py": "def f():\n    from .a import x\n"})
+    assert structure.circles(structure.folder_imports(package)) == [["a", "b"]]
+    tree(tmp_path, {"p/c.py": ""})
+    assert structure.circles(structure.folder_imports(package)) == []
 
 
 def test_variants_are_found_outside_tests_alone(tmp_path: Path) -> None:

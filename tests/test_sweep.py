@@ -19,8 +19,8 @@ from armrs import BadInput
 from armrs.cli import main
 from armrs.montecarlo import figures, load_sweep
 from armrs.montecarlo.case import compute, resampled
-from armrs.montecarlo.change import vary_of
 from armrs.montecarlo.summary import Moments, Quantity, Summary
+from armrs.montecarlo.variation import vary_of
 from armrs.report import plotting
 from armrs.workflows.identify import identify
 from armrs.workflows.record import measure

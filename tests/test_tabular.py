@@ -21,12 +21,12 @@ import pytest
 from matplotlib.axes import Axes
 
 import armrs
-from armrs import cli, views
-from armrs.cosim.accuracy import run_checked
+from armrs import cli, view_registry
+from armrs.cosim.error_estimate import run_checked
 from armrs.cosim.system import load_system
+from armrs.demo import true_model
 from armrs.tabular import Framed, Tabular, Tidy
 from armrs.workflows import history
-from armrs.workflows.demo import true_model
 from browser import opened
 from results import kinds, returned, series_faults
 from test_docs import DOCS, ROOT, blocks
@@ -190,7 +190,7 @@ def test_tables_of_a_report_fit_on_a4(identified: armrs.Identified, tmp_path: Pa
 @pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.__name__)
 def test_every_kind_of_result_has_its_own_words_and_a_page(kind: type) -> None:
     assert kind.__repr__ is not object.__repr__ and kind.tidy is not Tabular.tidy and callable(kind.to_dict)
-    assert views._load(views.DRAWN_BY[kind.__name__]).report
+    assert view_registry._load(view_registry.DRAWN_BY[kind.__name__]).report
 
 
 @pytest.mark.parametrize("name", returned())

@@ -15,10 +15,10 @@ import pytest
 
 import armrs
 from armrs import ArmrsError, BadInput, _armrs
-from armrs.workflows.demo import handed_over, true_model
+from armrs.demo import given_model, true_model
 
 MODEL = true_model()
-BELIEVED = handed_over(MODEL)
+BELIEVED = given_model(MODEL)
 ARM = armrs.Arm([0.3, 0.25], [2.0, 1.0], [0.15, 0.12], [0.02, 0.01])
 STATES = np.zeros((3, 2))
 MOVEMENT = armrs.Movement(np.radians([[-60, 60], [-48, 60]]), speed=0.5, acceleration=2.0)

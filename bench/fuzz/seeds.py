@@ -14,7 +14,7 @@ import numpy as np
 import armrs
 import armrs.cosim
 from armrs import cli
-from armrs.cosim.library import platform_folder
+from armrs.fmu.shared_library import platform_folder
 
 HERE = Path(__file__).parent
 CORPUS = HERE / "corpus"

@@ -16,7 +16,7 @@ import shutil
 from pathlib import Path
 
 from armrs.model import Model
-from armrs.montecarlo.spec import load_sweep
+from armrs.montecarlo.sweep_file import load_sweep
 from armrs.workflows.record import record
 
 LAWS = {"elastic": ("stiffness", "rest"), "viscous": ("viscosity",), "coulomb": ("coulomb",)}

@@ -20,7 +20,7 @@ import armrs
 from armrs.io.dataset import Dataset
 from armrs.io.plausibility import refuse_implausible
 from armrs.io.trial import Trial
-from armrs.workflows.setup import examine_setup
+from armrs.workflows.setup_check import examine_setup
 
 Change = Callable[[Trial], Trial]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import armrs
-from armrs.workflows.demo import handed_over, true_model
+from armrs.demo import given_model, true_model
 
 truth = true_model()
 movement = armrs.Movement(np.radians([[-60, 60], [-48, 60], [-60, 60], [-60, 72], [-60, 60]]), speed=0.1, shape="smooth")
@@ -26,7 +26,7 @@ trials = tuple(
     for k, read in enumerate(run.readings, start=1)
 )
 # The given model is 10 % too heavy and has no brakes.
-session = armrs.Dataset("an example", handed_over(truth), trials, force_on="robot", synthetic=True)
+session = armrs.Dataset("an example", given_model(truth), trials, force_on="robot", synthetic=True)
 
 with tempfile.TemporaryDirectory() as folder:
     armrs.write_dataset(session, folder)

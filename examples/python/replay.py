@@ -4,7 +4,7 @@ import numpy as np
 
 import armrs
 from armrs import online
-from armrs.workflows.demo import handed_over, true_model
+from armrs.demo import given_model, true_model
 
 # A device at 1 kHz that leads the demo's arm; its second angle freezes after six seconds, as the encoder's last value is repeated.
 truth = true_model()
@@ -16,7 +16,7 @@ q[6000:6800, 1] = q[6000, 1]
 log = online.Log(run.t, q, run.force_on_arm + 0.1 * random.normal(size=run.force_on_arm.shape))
 
 # The model that the device is given is 10 % too heavy; its brakes are known.
-model = handed_over(truth).replace(joints=truth.joints)
+model = given_model(truth).replace(joints=truth.joints)
 for gate in (8.0, 3.0):
     settings = online.default_settings(model, period=1e-3).replace(gate=gate)
     result = online.replay(log, model, settings=settings)

@@ -3,7 +3,7 @@
 import numpy as np
 
 import armrs
-from armrs.workflows.demo import true_model
+from armrs.demo import true_model
 
 model = true_model()  # the mechanical arm of the thesis
 movement = armrs.Movement(np.radians([[-60, 60], [-48, 60], [-60, 60]]), speed=0.5, acceleration=2.0, shape="smooth")

@@ -1,4 +1,4 @@
-"""armrs: what is an arm made of, when a robot leads it.
+"""armrs: identify a passive planar arm that a robot guides by the hand, and find which effects its model lacks.
 
 Everything is loaded on first use, so that `import armrs` costs next to nothing.
 """
@@ -11,14 +11,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from . import anthropometry as anthropometry
     from . import cosim as cosim
+    from . import demo as demo
     from . import online as online
     from ._armrs import Arm as Arm
     from ._armrs import __version__ as __version__
     from .anthropometry import Expected as Expected
     from .anthropometry import segment_expectations as segment_expectations
     from .catalogue import Parameter as Parameter
+    from .cosim.fmu_export import export_fmu as export_fmu
     from .custom_effects import OwnEffect as OwnEffect
     from .custom_effects import own_effect as own_effect
+    from .demo import Demonstration as Demonstration
+    from .demo import run_demo as run_demo
     from .errors import ArmrsError as ArmrsError
     from .errors import ArmrsWarning as ArmrsWarning
     from .errors import BadInput as BadInput
@@ -26,20 +30,19 @@ if TYPE_CHECKING:
     from .errors import SimulationError as SimulationError
     from .errors import SlaveError as SlaveError
     from .fmu.check import check_fmu as check_fmu
-    from .fmu.export import export_fmu as export_fmu
-    from .io.conversion import convert as convert
     from .io.dataset import Dataset as Dataset
     from .io.dataset import load_dataset as load_dataset
     from .io.dataset import write_dataset as write_dataset
     from .io.markers import Markers as Markers
     from .io.markers import PlanarMotion as PlanarMotion
     from .io.markers import planar_motion as planar_motion
-    from .io.motions import convert_markers as convert_markers
-    from .io.motions import convert_motion as convert_motion
-    from .io.motions import read_markers as read_markers
+    from .io.motion_files import convert_markers as convert_markers
+    from .io.motion_files import convert_motion as convert_motion
+    from .io.motion_files import read_markers as read_markers
     from .io.multibody import ExportedModel as ExportedModel
     from .io.multibody import export_model as export_model
     from .io.multibody import import_model as import_model
+    from .io.table_conversion import convert as convert
     from .io.trial import Trial as Trial
     from .model import Contact as Contact
     from .model import Effect as Effect
@@ -56,14 +59,11 @@ if TYPE_CHECKING:
     from .montecarlo import sweep as sweep
     from .report import plotting as plotting
     from .report.pages import write_report as write_report
-    from .workflows import demo as demo
     from .workflows import gap as gap
-    from .workflows.checking import Checked as Checked
-    from .workflows.checking import check_dataset as check_dataset
+    from .workflows.check_dataset import Checked as Checked
+    from .workflows.check_dataset import check_dataset as check_dataset
     from .workflows.cohort import Cohort as Cohort
     from .workflows.cohort import cohort as cohort
-    from .workflows.demo import Demonstration as Demonstration
-    from .workflows.demo import run_demo as run_demo
     from .workflows.firmware import FirmwareSource as FirmwareSource
     from .workflows.firmware import export_c as export_c
     from .workflows.fitting import SimulationFit as SimulationFit
@@ -101,28 +101,28 @@ _HOMES = {
     "_armrs": ("Arm", "__version__", "build_profile"),
     "anthropometry": ("Expected", "segment_expectations"),
     "catalogue": ("Parameter",),
-    "io.conversion": ("convert",),
+    "io.table_conversion": ("convert",),
     "io.dataset": ("Dataset", "load_dataset", "write_dataset"),
     "io.multibody": ("ExportedModel", "export_model", "import_model"),
-    "workflows.checking": ("Checked", "check_dataset"),
+    "workflows.check_dataset": ("Checked", "check_dataset"),
     "workflows.importing": ("Imported", "import_recordings"),
     "workflows.initialise": ("Worn", "initialise"),
     "workflows.cohort": ("Cohort", "cohort"),
     "workflows.spasticity": ("Spasticity", "spasticity"),
-    "workflows.demo": ("Demonstration", "run_demo"),
+    "demo": ("Demonstration", "run_demo"),
     "workflows.firmware": ("FirmwareSource", "export_c"),
     "workflows.gap": ("GapFound", "find_gap"),
     "errors": ("ArmrsError", "ArmrsWarning", "BadInput", "IdentificationError", "SimulationError", "SlaveError"),
     "workflows.fitting": ("SimulationFit", "fit_by_simulation"),
     "fmu.check": ("check_fmu",),
-    "fmu.export": ("export_fmu",),
+    "cosim.fmu_export": ("export_fmu",),
     "workflows.identify": ("Estimate", "Identified", "identify"),
     "workflows.record": ("Recorded", "record"),
     "io.markers": ("Markers", "PlanarMotion", "planar_motion"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "Subject", "Tolerance", "load_model"),
     "workflows.passive": ("PassiveCurve", "PassiveMoments", "passive_moments"),
     "montecarlo": ("Sweep", "Swept", "load_sweep", "sweep"),
-    "io.motions": ("convert_markers", "convert_motion", "read_markers"),
+    "io.motion_files": ("convert_markers", "convert_motion", "read_markers"),
     "custom_effects": ("OwnEffect", "own_effect"),
     "workflows.plan": ("Instruments", "Limits", "Plan", "forecast", "plan"),
     "report.pages": ("write_report",),
@@ -135,7 +135,7 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 _MODULES = {
     "anthropometry": "anthropometry",
     "cosim": "cosim",
-    "demo": "workflows.demo",
+    "demo": "demo",
     "gap": "workflows.gap",
     "online": "online",
     "plotting": "report.plotting",

@@ -1,4 +1,4 @@
-"""`armrs` and `python -m armrs`: the command line, and an end without a traceback while it still loads."""
+"""`armrs` and `python -m armrs`: the command line; an interrupt while it loads ends with one line instead of a traceback."""
 
 import contextlib
 import os

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .io.trial import Trial
-from .workflows.driven import CoreDrive, CoreRun
+from .workflows.core_experiment import CoreDrive, CoreRun
 from .workflows.gap.core_input import SearchSettings
 from .workflows.identify import CoreSettings
 from .workflows.movement import Movement

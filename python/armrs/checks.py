@@ -1,4 +1,4 @@
-"""Checks of single values. Each returns the value in its final type or raises `BadInput` naming the place."""
+"""Checks of arguments and of values in files. Each returns the value in its final type or raises `BadInput` naming the place."""
 
 from __future__ import annotations
 

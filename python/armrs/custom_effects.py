@@ -1,4 +1,4 @@
-"""Effects of one's own: a law of angle and speed as a Python callable, simulated and searched for like those of the catalogue."""
+"""User-defined effects: a law of angle and speed as a Python callable, simulated and searched for like those of the catalogue."""
 
 from __future__ import annotations
 

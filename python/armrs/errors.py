@@ -144,7 +144,7 @@ class CoupledError(ArmrsError):
 
     Attributes
     ----------
-    run : Coupled, optional
+    run : CoupledRun, optional
         The run as far as it went, for diagnosis.
     """
 

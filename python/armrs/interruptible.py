@@ -1,4 +1,4 @@
-"""Long calls of the core that Ctrl-C ends at once.
+"""Long calls of the core that Ctrl-C interrupts immediately.
 
 Python runs the handler of a signal in the main thread, between two of its own instructions: a call into the core would hold it back
 until it returns. The core therefore works in a thread of its own, for which the main thread waits.

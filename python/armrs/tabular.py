@@ -1,4 +1,4 @@
-"""Results as tables and pictures: in a notebook, as a data frame, as labelled arrays, as JSON, as a report."""
+"""Base classes of results: data frames, labelled arrays, JSON, display in notebooks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from . import views
+from . import view_registry
 from .errors import ArmrsError
 from .io import files
 
@@ -123,7 +123,7 @@ class Tabular(Framed):
         BadInput
             For a name that is unknown, and a result without anything to draw.
         """
-        axes: np.ndarray = views.of(self).plot(self, name)
+        axes: np.ndarray = view_registry.of(self).plot(self, name)
         return axes
 
     def report(self, path: str | os.PathLike[str]) -> Path:
@@ -134,7 +134,7 @@ class Tabular(Framed):
         BadInput
             When the name does not end with `.html`, or cannot be written.
         """
-        written: Path = views.of(self).report(self, path)
+        written: Path = view_registry.of(self).report(self, path)
         return written
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:

@@ -1,4 +1,4 @@
-"""Standard deviations of a least-squares fit whose errors are alike within trials and differ between them, for few trials."""
+"""Standard deviations of a least-squares fit whose errors are correlated within trials (clusters), for few trials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The elastic moment of a joint as two exponentials and a slope, whose limits may move with the adjacent angle.
+"""The elastic moment of a joint as two exponentials and a slope; the limits of the range may shift with the adjacent angle.
 
 `f = upper·exp(k_u (q + r_u a − q_hi)) − lower·exp(−k_l (q + r_l a − q_lo)) + stiffness·(q − q_mid)`, a the adjacent angle from its mean.
 The exponentials are those of Riener and Edrich 1999, in whose exponents the adjacent angle stands; with both ratios zero they are those of
@@ -33,7 +33,7 @@ _FLIPS = 1999
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class MomentCurve:
     """The elastic moment of one trial against the angle.
 
     Attributes
@@ -98,7 +98,7 @@ class Problem:
     `‖W r‖² = min_b ‖r − Z b‖² + σ² ‖b‖²`.
     """
 
-    def __init__(self, courses: Sequence[Course], *, with_errors: bool = False) -> None:
+    def __init__(self, courses: Sequence[MomentCurve], *, with_errors: bool = False) -> None:
         self.q = np.concatenate([c.angle for c in courses])
         held = np.array([c.adjacent for c in courses])
         self.mean = float(held.mean())
@@ -261,7 +261,7 @@ def derivatives(q: np.ndarray, adjacent: np.ndarray | float, values: np.ndarray,
     return np.stack([high, low, line, *own, rising * adjacent, falling * adjacent], axis=1)
 
 
-def _noise(courses: Sequence[Course]) -> float:
+def _noise(courses: Sequence[MomentCurve]) -> float:
     """Return the noise of a moment [N m]: what a polynomial of degree 4 leaves in each configuration, each trial with its level."""
     squares, freedom = 1e-300, 0
     for name in dict.fromkeys(c.configuration for c in courses):

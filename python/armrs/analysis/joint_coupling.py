@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import students_t
-from .double_exponential import NAMES, UNITS, Course, Problem, Shape, columns, derivatives
+from .double_exponential import NAMES, UNITS, MomentCurve, Problem, Shape, columns, derivatives
 
 LEAST_HELD = np.radians(5.0)
 """The adjacent angle must differ by this much between configurations before a dependence on it can be determined [rad]."""
@@ -173,23 +173,23 @@ class Coupling:
         }
 
 
-def fit_joints(courses: Mapping[tuple[int, int], Sequence[Course]], level: float = 0.95) -> tuple[Dependence, ...]:
+def fit_joints(courses: Mapping[tuple[int, int], Sequence[MomentCurve]], level: float = 0.95) -> tuple[Dependence, ...]:
     """Fit the joints, each by its courses and the adjacent joint, those left out that have too few data; see `fit`.
 
     Ends of a range that move with the adjacent angle belong to an energy `exp(k (q + r a))`, and so to the moments of both joints. Where
     each was moved while the other was held, both are tested together: twice the smaller p value (Bonferroni) is that of either. The weight
     of an arm known to 5 % hides them in the shoulder, and not in the elbow.
     """
-    told = {key: _Asked.of(own) for key, own in courses.items() if _enough(own)}
-    alone = {key: asked.beside_errors.linear_law_p_value(asked.beside_errors.linear) for key, asked in told.items()}
+    told = {key: _CouplingData.of(own) for key, own in courses.items() if _enough(own)}
+    alone = {key: data.beside_errors.linear_law_p_value(data.beside_errors.linear) for key, data in told.items()}
     found = []
-    for (joint, adjacent), asked in told.items():
+    for (joint, adjacent), data in told.items():
         both = [alone[key] for key in ((joint, adjacent), (adjacent, joint)) if key in alone]
-        found.append(_fitted(asked, joint, adjacent, level, min(len(both) * min(both), 1.0)))
+        found.append(_fitted(data, joint, adjacent, level, min(len(both) * min(both), 1.0)))
     return tuple(found)
 
 
-def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.95) -> Dependence | None:
+def fit(courses: Sequence[MomentCurve], joint: int, adjacent: int, level: float = 0.95) -> Dependence | None:
     """Fit the dependence of an elastic moment on both angles.
 
     Parameters
@@ -216,27 +216,27 @@ def fit(courses: Sequence[Course], joint: int, adjacent: int, level: float = 0.9
     return next(iter(fit_joints({(joint, adjacent): courses}, level)), None)
 
 
-def _enough(courses: Sequence[Course]) -> bool:
+def _enough(courses: Sequence[MomentCurve]) -> bool:
     """Whether courses are enough to determine a dependence on the adjacent angle."""
     return len(courses) >= 4 and bool(np.ptp([c.adjacent for c in courses]) >= LEAST_HELD)
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _CouplingData:
     """Courses, their moments, and these beside what shared errors may do, where any are known."""
 
-    courses: Sequence[Course]
+    courses: Sequence[MomentCurve]
     moments: Problem
     beside_errors: Problem
 
     @classmethod
-    def of(cls, courses: Sequence[Course]) -> _Asked:
+    def of(cls, courses: Sequence[MomentCurve]) -> _CouplingData:
         moments = Problem(courses)
         return cls(courses, moments, Problem(courses, with_errors=True) if all(c.errors.size for c in courses) else moments)
 
 
-def _fitted(asked: _Asked, joint: int, adjacent: int, level: float, linear_p_value: float) -> Dependence:
-    courses, problem, beside = asked.courses, asked.moments, asked.beside_errors
+def _fitted(data: _CouplingData, joint: int, adjacent: int, level: float, linear_p_value: float) -> Dependence:
+    courses, problem, beside = data.courses, data.moments, data.beside_errors
     share = 0.0 if linear_p_value >= 1.0 - level else beside.share(beside.full, beside.linear)
     mean = _levels(problem, courses, problem.linear)
     shape = problem.linear if share < LEAST_SHARE else problem.full
@@ -259,7 +259,7 @@ def _fitted(asked: _Asked, joint: int, adjacent: int, level: float, linear_p_val
     )
 
 
-def _levels(problem: Problem, courses: Sequence[Course], shape: Shape) -> _Line:
+def _levels(problem: Problem, courses: Sequence[MomentCurve], shape: Shape) -> _Line:
     """Return the line of what a shape leaves of whole trials, against the adjacent angle.
 
     Where a joint moves through other angles while the adjacent one is held elsewhere, its own spring changes the levels as a coupling

@@ -1,4 +1,4 @@
-"""The low-pass of a channel of which some samples are spoiled."""
+"""Low-pass filter of a channel with missing or excluded samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Preconditioning: the first cycles of a tissue that has rested resist more than later ones, and are no repeats of them.
+"""Preconditioning: the first cycles of rested tissue resist more than later ones, so they do not count as repeats.
 
 A cycle is a movement up and down, or down and up, through the same angles. What it dissipates is the area of its loop over the angles that
 all cycles share. The level is that of the later half of the cycles; a first cycle whose loop is larger than a single one would be in one of

@@ -1,4 +1,4 @@
-"""Fast motion of an arm of two segments from the angles of the robot that leads it: encoders have less noise than cameras.
+"""Fast motion of an arm of two segments, computed from the robot's angles: encoders have less noise than cameras.
 
 Slow motion is that of the cameras, as the handle may be displaced from the markers; what is faster than a cutoff is that of the robot:
 `q + (1 − LP)(q_r − LP q)`, with q_r the angles at which the hand stands where the robot holds it, less the yield of the contact.

@@ -1,4 +1,4 @@
-"""How uncertain passive moments are because masses, lengths, angles and forces are (appendix A of the thesis): Jacobian and Monte Carlo."""
+"""Uncertainty of passive moments due to masses, lengths, angles and forces (appendix A of the thesis): Jacobian and Monte Carlo."""
 
 from __future__ import annotations
 

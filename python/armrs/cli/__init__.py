@@ -1,4 +1,4 @@
-"""The command line: `armrs <verb>`.
+"""The command line `armrs VERB`: the list of verbs, options, exit status.
 
 A verb parses, calls one public function and writes. `main` is the only place that turns errors into lines and exit statuses:
 0 done, 1 ran and found something that needs the user, 2 bad input (one line, nothing written).

@@ -1,4 +1,4 @@
-"""Verbs that say what a data set tells of its arm."""
+"""The verbs `identify`, `gap` and `passive`."""
 
 from __future__ import annotations
 
@@ -100,9 +100,9 @@ def identify(
     result with status 1 is not added to a history.
     """
     from ..io.dataset import load_dataset
-    from ..report import words
-    from ..report.plain import identified_data
+    from ..report import sentences
     from ..workflows.identify import identify as run_identification
+    from ..workflows.result_data import identified_data
 
     folder = writable(out, json, verb="identify")
     data = load_dataset(dataset)
@@ -120,7 +120,7 @@ def identify(
     with kept(history if result.is_sound else None, result, day, plain):
         written = []
         if folder:
-            from ..report.results import write_identified
+            from ..report.result_files import write_identified
 
             written = write_identified(result, plain, folder)
         console.warn([*data.warnings, *result.warnings])
@@ -129,7 +129,7 @@ def identify(
         step = f"armrs gap {quoted(dataset)} -o gap"
         if not result.is_sound:
             step = f"armrs check {quoted(dataset)} lists problems of the recordings; {step} looks for what the model lacks"
-        present(lambda: plain, json, lambda: words.identified(plain, written), step)
+        present(lambda: plain, json, lambda: sentences.identified(plain, written), step)
     return 0 if result.is_sound else 1
 
 
@@ -154,7 +154,8 @@ def gap(
     that no effect of the catalogue explains.
     """
     from ..io.dataset import load_dataset
-    from ..workflows.gap import calibrate, find_gap, words
+    from ..report.gap import sentences
+    from ..workflows.gap import calibrate, find_gap
 
     if quick and out is not None:
         raise BadInput("--quick", Text("-o beside it"), "--json, or nothing: a first answer has no report")
@@ -167,18 +168,18 @@ def gap(
         with console.stages("a first look") as tell:
             first = calibrate(data, threads=threads, progress=tell)
         console.warn([*data.warnings, *first.warnings])
-        present(lambda: first.to_dict(command_line(context)), json, lambda: words.quick(first.to_dict()))
+        present(lambda: first.to_dict(command_line(context)), json, lambda: sentences.quick(first.to_dict()))
         return 0
     with console.stages("looking for what is missing") as tell:
         result = find_gap(data, threads=threads, progress=tell)
-    from ..workflows.gap.results import gap_data, write_gap
+    from ..report.gap.result_files import gap_data, write_gap
 
     plain = gap_data(result, command_line(context))
     with kept(history, result, day, plain):
         written = write_gap(result, plain, folder) if folder else []
         console.warn([*data.warnings, *result.warnings])
         step = after_gap(plain, dataset, folder, data)
-        present(lambda: plain, json, lambda: words.show(plain, written), step)
+        present(lambda: plain, json, lambda: sentences.show(plain, written), step)
     return 1 if result.verdict == "unexplained" else 0
 
 
@@ -222,9 +223,9 @@ def passive(
     Exit status 1 when no joint moved long enough in both directions.
     """
     from ..io.dataset import load_dataset
-    from ..report import words
-    from ..report.plain import passive_data
+    from ..report import sentences
     from ..workflows.passive import passive_moments
+    from ..workflows.result_data import passive_data
 
     folder = writable(out, json, verb="passive")
     data = load_dataset(dataset)
@@ -235,9 +236,9 @@ def passive(
     with kept(history, result, day, plain):
         written = []
         if folder:
-            from ..report.results import write_passive
+            from ..report.result_files import write_passive
 
             written = write_passive(result, plain, folder)
         console.warn([*data.warnings, *result.warnings])
-        present(lambda: plain, json, lambda: words.passive(plain, written))
+        present(lambda: plain, json, lambda: sentences.passive(plain, written))
     return 0 if result.curves else 1

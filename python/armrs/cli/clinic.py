@@ -1,4 +1,4 @@
-"""Verbs of a clinic: reflexes by speed, and cohorts."""
+"""The verbs `spasticity` and `cohort`."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def spasticity(
     Exit status 1 when no joint shows a reflex.
     """
     from ..io.dataset import load_dataset
-    from ..report import clinic_words
-    from ..report.clinic_results import spasticity_data, write_spasticity
+    from ..report import clinic_sentences
+    from ..report.clinic_figures import spasticity_data, write_spasticity
     from ..workflows.spasticity import spasticity as find_reflexes
 
     folder = writable(out, json, verb="spasticity")
@@ -44,7 +44,7 @@ def spasticity(
     with kept(history, result, day, plain):
         written = write_spasticity(result, plain, folder) if folder else []
         console.warn([*data.warnings, *result.warnings])
-        present(lambda: plain, json, lambda: clinic_words.show(plain, written))
+        present(lambda: plain, json, lambda: clinic_sentences.show(plain, written))
     return 0 if any(j.reflex.found for j in result.joints) else 1
 
 
@@ -69,8 +69,8 @@ def cohort(
 
     Exit status 1 when something was left out.
     """
-    from ..report import clinic_words
-    from ..report.clinic_results import cohort_data, write_cohort
+    from ..report import clinic_sentences
+    from ..report.clinic_figures import cohort_data, write_cohort
     from ..workflows.cohort import cohort as summarise
 
     folder = writable(out, json, verb="cohort")
@@ -79,5 +79,5 @@ def cohort(
     plain = cohort_data(result, command_line(context))
     written = write_cohort(result, plain, folder) if folder else []
     console.warn(list(result.warnings))
-    present(lambda: plain, json, lambda: clinic_words.show_cohort(plain, written))
+    present(lambda: plain, json, lambda: clinic_sentences.show_cohort(plain, written))
     return 1 if result.warnings else 0

@@ -1,4 +1,4 @@
-"""What the verbs share: options that several have, and how results reach the user."""
+"""Options and output functions that several verbs share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verbs that compute nothing of an arm: the catalogue, conversions, reports."""
+"""The verbs `effects`, `convert` and `report`."""
 
 from __future__ import annotations
 
@@ -91,12 +91,12 @@ def convert(
     json: JsonFile = None,
 ) -> None:
     """Convert between file formats, every value kept to the bit; turn marker trajectories into joint angles and segment lengths."""
-    from ..io import motions
-    from ..io.conversion import convert as run_conversion
+    from ..io import motion_files
     from ..io.markers import MARKER_SUFFIXES
     from ..io.opensim import MOTION_SUFFIXES
     from ..io.samples import SUFFIXES
-    from ..report import words
+    from ..io.table_conversion import convert as run_conversion
+    from ..report import sentences
 
     if to.value in _MODEL_SUFFIX:
         _convert_model(source, out, to.value, force, json)
@@ -105,19 +105,19 @@ def convert(
     chosen, named = listed(points), listed(coordinates)
     writable(out, json)
     if suffix in MARKER_SUFFIXES:
-        file, motion, notes = motions.convert_markers(source, out, to=to.value, points=chosen, up=up, forward=forward)
+        file, motion, notes = motion_files.convert_markers(source, out, to=to.value, points=chosen, up=up, forward=forward)
         console.warn(notes)
         present(
             lambda: {"files": [file], "points": chosen, **motion.to_dict(), "warnings": notes},
             json,
-            lambda: words.planar(motion, chosen, file),
+            lambda: sentences.planar(motion, chosen, file),
         )
         return
     for option, given in (("--points", points), ("--up", up), ("--forward", forward)):
         if given:
             raise BadInput(option, Text(f"a {suffix or 'data set'} source"), f"{option} with {' or '.join(MARKER_SUFFIXES)} files only")
     if suffix in MOTION_SUFFIXES or f".{to.value}" in MOTION_SUFFIXES or named:
-        written = [motions.convert_motion(source, out, to=to.value, coordinates=named)]
+        written = [motion_files.convert_motion(source, out, to=to.value, coordinates=named)]
     else:
         written = run_conversion(source, out, to=to.value)
     present(lambda: {"files": written}, json, lambda: print("\n".join(os.fspath(path) for path in written)))
@@ -165,7 +165,7 @@ def report(
     if norms is not None and not summary:
         raise BadInput("--norms", Text("no --summary"), "--norms beside --summary")
     if summary:
-        from ..report.clinic import load_norms, write_summary
+        from ..report.clinic_page import load_norms, write_summary
 
         usual = () if norms is None else load_norms(norms)
         page = files.output_folder(out, "-o") / "summary.html"

@@ -1,4 +1,4 @@
-"""Verbs that make data: experiments simulated, planned, recorded, and many of them."""
+"""The verbs `simulate`, `plan`, `record` and `sweep`."""
 
 from __future__ import annotations
 
@@ -86,13 +86,13 @@ def simulate(
     doubt is compared with half the step without being asked.
     """
     from ..model import load_model
-    from ..report import words
-    from ..report.plain import simulated_data
-    from ..workflows.accuracy import WRONG, step_error
+    from ..report import sentences
     from ..workflows.movement import load_movement
+    from ..workflows.result_data import simulated_data
     from ..workflows.simulate import is_doubtful
-    from ..workflows.stiction import sticking_said
-    from ..workflows.streamed import stream
+    from ..workflows.simulation_accuracy import WRONG, step_error
+    from ..workflows.stiction import sticking_warnings
+    from ..workflows.streamed_simulation import stream
 
     if (movement is None) == (trial is None):
         raise BadInput("--movement, --trial", Text("neither" if movement is None else "both"), "one of them")
@@ -123,12 +123,12 @@ def simulate(
             plain["half_step"] = dataclasses.asdict(halved)
         written = []
         if folder:
-            from ..report.results import write_simulated
+            from ..report.result_files import write_simulated
 
             written = write_simulated(result, plain, folder, suffix=suffix, trial=measured)
-        warnings = [*sticking_said(arm), *result.warnings, *(() if halved is None else halved.warnings)]
+        warnings = [*sticking_warnings(arm), *result.warnings, *(() if halved is None else halved.warnings)]
     console.warn([*arm.warnings, *(() if reading is None else reading.warnings), *warnings])
-    present(lambda: plain, json, lambda: words.simulated(plain, written))
+    present(lambda: plain, json, lambda: sentences.simulated(plain, written))
     worst = max(plain["energy"]["error_share"], 0.0 if halved is None else halved.share)
     return 0 if worst < WRONG else 1
 
@@ -174,7 +174,7 @@ def plan(
     Exit status 1 when a parameter will stay uncertain by more than half its value.
     """
     from ..model import load_model
-    from ..report import words
+    from ..report import sentences
     from ..workflows import plan as planning
     from ..workflows.gap import detectable
     from ..workflows.movement import load_movement
@@ -208,9 +208,9 @@ def plan(
             smallest = detectable(arm, found.movements, repeats=repeats)
     plain = planning.plan_data(found, beside, smallest, name=f"a plan for {model.name}", command=command_line(context))
     if folder:
-        from ..report.results import write_planned
+        from ..report.result_files import write_planned
     written = write_planned(found, plain, folder) if folder else []
-    present(lambda: plain, json, lambda: words.planned(plain, written))
+    present(lambda: plain, json, lambda: sentences.planned(plain, written))
     return 0 if found.worst <= planning.MOST_UNCERTAIN else 1
 
 
@@ -225,12 +225,12 @@ def record(
     With [sensors.six_axis], the force is made of the readings of a six-axis force sensor, which are in wrench/. Exit status 1 when the
     safety supervisor stopped a trial; that trial is not in the data set.
     """
-    from ..report import words
-    from ..report.plain import origin
-    from ..report.results import write_recorded
+    from ..report import sentences
+    from ..report.result_files import write_recorded
     from ..workflows.experiment import load_experiment
     from ..workflows.record import record as run_record
-    from ..workflows.stiction import sticking_said
+    from ..workflows.result_data import origin
+    from ..workflows.stiction import sticking_warnings
 
     writable(out, json, verb="record")
     planned = load_experiment(experiment)
@@ -238,11 +238,11 @@ def record(
         result = run_record(planned, out, step=step)
     plain = result.to_dict() | {"made_by": origin(command_line(context))}
     report = write_recorded(result, plain, out)[-1]
-    console.warn(sticking_said(planned.truth))
+    console.warn(sticking_warnings(planned.truth))
     apart = "" if any(run.tests for run in planned.runs) else "; tests = 1 in [[movement]] records a test trial, which no fit uses"
     worn = ", ".join(run.configuration for run in planned.runs if run.worn)
     alike = f"remove [[added]] and the trials of {worn} from {quoted(out / 'dataset.toml')}, then " if worn else ""
-    present(lambda: plain, json, lambda: words.recorded(plain, report), f"{alike}armrs gap {quoted(out)} -o gap{apart}")
+    present(lambda: plain, json, lambda: sentences.recorded(plain, report), f"{alike}armrs gap {quoted(out)} -o gap{apart}")
     return 1 if result.stopped else 0
 
 
@@ -275,9 +275,9 @@ def sweep(
       key = "joint[2].coulomb"
       range = [0.0, 0.3]                # uniform
     """  # noqa: D301 (click reads this backspace as: leave the lines as they are)
-    from ..montecarlo import load_sweep, words
+    from ..montecarlo import load_sweep, sentences
     from ..montecarlo import sweep as run_sweep
-    from ..workflows.stiction import sticking_said
+    from ..workflows.stiction import sticking_warnings
 
     writable(out, json, verb="sweep")
     if cluster is not None and jobs is not None:
@@ -287,11 +287,11 @@ def sweep(
     with console.progress("cases", planned.cases) as step:
         result = run_sweep(planned, out, jobs=count, cluster=cluster, step=step, command=command_line(context))
     if planned.dataset is None:
-        console.warn(sticking_said(planned.experiment(planned.seed_of(1), []).truth))
+        console.warn(sticking_warnings(planned.experiment(planned.seed_of(1), []).truth))
     present(
         lambda: result.data | {"run": result.run, "files": list(result.files)},
         json,
-        lambda: words.swept(result.data, result.run, result.files),
+        lambda: sentences.swept(result.data, result.run, result.files),
     )
     return 1 if result.failed else 0
 

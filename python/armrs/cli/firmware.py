@@ -1,4 +1,4 @@
-"""The verb that leads to a device."""
+"""The verb `export-c`."""
 
 from __future__ import annotations
 

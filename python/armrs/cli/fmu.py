@@ -60,10 +60,10 @@ def fmu_export(
 
     Exports of the same model are byte-identical. The FMU contains the parameters of the arm as plain text; its token reveals edits.
     """
+    from ..cosim.fmu_export import export_fmu
     from ..cosim.slave import Slave
-    from ..fmu.export import export_fmu
-    from ..fmu.libraries import collected
-    from ..workflows.stiction import too_steep_said
+    from ..fmu.bundled_libraries import collected
+    from ..workflows.stiction import too_steep_warnings
 
     writable(None, json)
     target = out if out is not None else Path(model.with_suffix(".fmu").name)
@@ -79,7 +79,7 @@ def fmu_export(
         console.warn([f"left out: {', '.join(without)}, because FMI 2.0 has no folder for them; export with --fmi 3"])
     if slave.left_out:
         console.warn([f"left out, because they act in sensors or contact, outside this port: {', '.join(slave.left_out)}"])
-    console.warn(too_steep_said(slave.model, slave.internal_step))
+    console.warn(too_steep_warnings(slave.model, slave.internal_step))
     data = {
         "verb": "fmu export",
         "file": written,
@@ -155,20 +155,20 @@ def fmu_run(
     if the run gives no result: it is not accurate, not resolved, or diverged; the coupling created energy; the iteration did not
     converge; or a slave failed. It is 1, with samples, if a slave ended the run early or the error could not be estimated.
     """
-    from ..cosim.accuracy import run_checked
-    from ..cosim.coupled import RESULTS
+    from ..cosim.coupled_output import coupled_data, write_coupled
+    from ..cosim.coupled_run import RESULTS
+    from ..cosim.error_estimate import run_checked
     from ..cosim.master import run_system
-    from ..cosim.outcome import coupled_data, write_coupled
     from ..cosim.slave import Slave
     from ..errors import CoupledError
-    from ..report import words
-    from ..workflows.stiction import too_steep_said
+    from ..report import sentences
+    from ..workflows.stiction import too_steep_warnings
 
     suffix = samples_suffix(to, out)
     folder = writable(out, json, verb="fmu run")
     loaded = _loaded(system, step, duration)
     arms = {name: slave for name, slave in loaded.slaves.items() if isinstance(slave, Slave)}
-    console.warn([f"{name}: {said}" for name, arm in arms.items() for said in too_steep_said(arm.model, arm.internal_step)])
+    console.warn([f"{name}: {said}" for name, arm in arms.items() for said in too_steep_warnings(arm.model, arm.internal_step)])
     try:
         # How often a system halves its step until the errors are within its accuracy is not known before.
         total = None if estimate and loaded.refine else loaded.count * (3 if estimate else 1)
@@ -187,7 +187,7 @@ def fmu_run(
         console.warn([f"{run.verdict}, no result: {run.why}"])
     elif run.verdict == "ended":
         console.warn([run.why])
-    present(lambda: plain, json, lambda: words.coupled(plain, written))
+    present(lambda: plain, json, lambda: sentences.coupled(plain, written))
     return 0 if run.verdict == "good" or (run.verdict == "stable" and not estimate) else 1
 
 

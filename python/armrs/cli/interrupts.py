@@ -1,4 +1,4 @@
-"""Signals that end a command: each becomes an exception, and is not lost where the code of a library swallows it, as while one loads."""
+"""Signals that end a command. Each becomes an exception, also where a library swallows it, such as while a module loads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verbs for own data: a first data set of a person, recordings into a data set, every problem of a data set."""
+"""The verbs `init`, `import` and `check`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .common import JsonFile, OutFolder, Source, command_line, listed, on_a_term
 
 if TYPE_CHECKING:
     from ..model import Robot
-    from ..workflows.checking import Checked
+    from ..workflows.check_dataset import Checked
     from ..workflows.initialise import Worn
 
 
@@ -227,7 +227,7 @@ def import_(
     if ask and not talking:
         raise BadInput("--ask", Text("no terminal"), "a terminal to ask on, or --map")
     if ask:
-        columns = ",".join(filter(None, [_asked(sources, tuple(listed(points)), arm), columns]))
+        columns = ",".join(filter(None, [_ask_columns(sources, tuple(listed(points)), arm), columns]))
     try:
         with console.stages("importing") as tell:
             done = import_recordings(sources, out, model=arm, columns_map=columns, progress=tell, **options)  # type: ignore[arg-type]
@@ -236,13 +236,13 @@ def import_(
             raise
         for problem in error.problems if isinstance(error, BadInputs) else (error,):
             print(f"armrs: {problem}", file=sys.stderr)
-        columns = _asked(sources, tuple(listed(points)), arm)
+        columns = _ask_columns(sources, tuple(listed(points)), arm)
         done = import_recordings(sources, out, model=arm, columns_map=columns, **options)  # type: ignore[arg-type]
 
     picture = write_recording(load_dataset(done.folder), done.folder)
 
     def data() -> Any:
-        from ..report.data_sets import imported_data
+        from ..report.dataset_pages import imported_data
 
         return imported_data(done, command_line(context))
 
@@ -272,10 +272,10 @@ def _joint(text: str) -> int:
     return int(text)
 
 
-def _asked(sources: list[Path], points: tuple[str, ...], model: Path) -> str:
+def _ask_columns(sources: list[Path], points: tuple[str, ...], model: Path) -> str:
     """Ask which column is what, each with a guess; returns the answers as `--map` has them."""
     from ..model import load_model
-    from ..workflows.importing.questions import questions
+    from ..workflows.importing.column_questions import questions
 
     table, asked = questions(sources, points, [joint.name for joint in load_model(model).joints])
     names = [c.name for c in table.columns]
@@ -315,13 +315,13 @@ def check(context: typer.Context, dataset: Source, json: JsonFile = None) -> int
 
     Exit status 1 if a problem prevents a verb from using the data.
     """
-    from ..workflows.checking import check_dataset, grouped
+    from ..workflows.check_dataset import check_dataset, grouped
 
     with console.stages("checking") as tell:
         done = check_dataset(dataset, progress=tell)
 
     def data() -> Any:
-        from ..report.data_sets import checked_data
+        from ..report.dataset_pages import checked_data
 
         return checked_data(done, command_line(context))
 

@@ -1,4 +1,4 @@
-"""The master: steps the slaves of a system together, and estimates the error of the result."""
+"""The master algorithm: steps the slaves of a system together."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArmrsError, BadInput, CoupledError, SlaveError, Text
-from .between import Between
-from .coupled import RESULTS, ConnectionReport, Coupled
-from .pace import Pace
-from .partner import Partner, Status
+from ..fmu.slave_interface import Partner, Status
+from .coupled_run import RESULTS, ConnectionReport, CoupledRun
+from .intermediate_outputs import IntermediateOutputs
 from .slave import Slave
+from .step_control import StepControl
 from .system import System, family, whole_range
 
 MOST_CREATED = 0.02
@@ -30,8 +30,8 @@ LITTLE = 1e-3
 """Least change of a variable that errors are compared with, in units of its nominal value."""
 
 
-def run_system(system: System, *, resolution: float = np.inf, progress: Callable[[int], None] = lambda steps: None) -> Coupled:
-    """Run a system from zero to its duration, without an estimate of its error: `armrs.cosim.accuracy.run_checked` has one.
+def run_system(system: System, *, resolution: float = np.inf, progress: Callable[[int], None] = lambda steps: None) -> CoupledRun:
+    """Run a system from zero to its duration, without an estimate of its error: `armrs.cosim.error_estimate.run_checked` has one.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def run_system(system: System, *, resolution: float = np.inf, progress: Callable
 
     Returns
     -------
-    Coupled
+    CoupledRun
 
     Raises
     ------
@@ -94,7 +94,7 @@ class _Run:
         self.within = np.array([c.within for c in connections])
         self.into = [np.flatnonzero(self.target == i) for i in range(len(self.slaves))]
         self.out_of = [np.flatnonzero(self.source == i) for i in range(len(self.slaves))]
-        self.between = Between(self.out_of, [len(places) > 0 for places in self.into], len(connections), resolution)
+        self.between = IntermediateOutputs(self.out_of, [len(places) > 0 for places in self.into], len(connections), resolution)
         self.input_names = [[connections[k].target[1] for k in places] for places in self.into]
         self.ranges = [self._ranges(i, places) for i, places in enumerate(self.into)]
         self.output_names = [[connections[k].source[1] for k in places] for places in self.out_of]
@@ -165,7 +165,7 @@ class _Run:
 
     def steps(self, progress: Callable[[int], None]) -> None:
         """Make every step, or stop where one cannot be made."""
-        pace = Pace(self.system)
+        pace = StepControl(self.system)
         while (end := pace.end) is not None:
             begin, start, raw = pace.begin, self.y.copy(), self.raw.copy()
             kept = self._keep() if pace.repeats else None
@@ -394,7 +394,7 @@ class _Run:
         )
         self.outputs.append(np.concatenate([s.get(names) for s, names in zip(self.slaves, self.recorded, strict=True)]))
 
-    def result(self) -> Coupled:
+    def result(self) -> CoupledRun:
         """Return the run with its verdict."""
         n, count = len(self.used), len(self.system.connections)
         t = np.array(self.times)
@@ -417,7 +417,7 @@ class _Run:
         sources = [".".join(c.source) for c in self.system.connections]
         verdict, why, warnings = self._judge(created, exchanged, outputs)
         names = [f"{s.name}.{name}" for s, listing in zip(self.slaves, self.recorded, strict=True) for name in listing]
-        return Coupled(
+        return CoupledRun(
             system=self.system,
             verdict=verdict,
             why=why,

@@ -1,4 +1,4 @@
-"""The arm as a co-simulation slave in Python: the same table, rules and bits as the FMU."""
+"""The arm as a co-simulation slave in Python, with the variables, rules and bits of the FMU."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..errors import BadInput, SlaveError, Text, unknown_name
+from ..fmu.slave_interface import Partner, Status, StepResult, Variable, listed
 from ..model import Model, load_model
 from ..workflows.stiction import DEFAULT_DT
-from .partner import Partner, Status, StepResult, Variable, listed
 
 PORTS = ("force", "motion")
 
@@ -45,7 +45,7 @@ class Slave(Partner):
     Examples
     --------
     >>> from armrs.cosim import Slave
-    >>> from armrs.workflows.demo import true_model
+    >>> from armrs.demo import true_model
     >>> arm = Slave(true_model(), start=[-1.0, 0.5])
     >>> arm.enter_initialization_mode(0.0)
     >>> arm.exit_initialization_mode()

@@ -1,4 +1,4 @@
-"""Systems in the files of SSP 1.0 (System Structure and Parameterization): `.ssp` archives and bare `.ssd` files are read."""
+"""Reader of SSP 1.0 (System Structure and Parameterization): `.ssp` archives and bare `.ssd` files."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from xml.etree import ElementTree
 from .. import checks
 from ..errors import BadInput, Text
 from ..fmu.archive import archive, refuse_xml, unpack, xml_root
-from .isolated import IsolatedSlave
-from .partner import Partner
+from ..fmu.isolated_slave import IsolatedSlave
+from ..fmu.slave_interface import Partner
 from .system import System, couple
 
 ROOT = "SystemStructure.ssd"

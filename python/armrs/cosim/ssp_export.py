@@ -12,10 +12,10 @@ from xml.etree import ElementTree
 from .. import checks
 from ..errors import BadInput, Text
 from ..fmu.description import BASE_UNITS
-from ..fmu.export import export_fmu
+from ..fmu.isolated_slave import IsolatedSlave
+from ..fmu.slave_interface import Partner, Variable
 from ..io import files
-from .isolated import IsolatedSlave
-from .partner import Partner, Variable
+from .fmu_export import export_fmu
 from .slave import Slave
 from .ssp import ANNOTATION, NAMESPACES, ROOT
 from .system import Connection, System

@@ -14,12 +14,12 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
+from ..fmu.isolated_slave import IsolatedSlave
+from ..fmu.slave_interface import Partner, Variable
 from ..io import tomlfile
-from .isolated import IsolatedSlave
-from .partner import Partner, Variable
-from .ready import from_table
+from .haptic_wall import Wall
 from .slave import Slave
-from .wall import Wall
+from .sources_and_controllers import from_table
 
 ALGORITHMS = ("jacobi", "gauss-seidel", "iterated")
 KINDS = ("model", "fmu", "wall", "signal", "pid", "impedance")

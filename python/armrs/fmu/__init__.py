@@ -1,1 +1,1 @@
-"""Functional mock-up units: read, check, export."""
+"""Functional mock-up units: read, check, run as a slave."""

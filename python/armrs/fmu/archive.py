@@ -1,4 +1,4 @@
-"""An FMU as an archive: opened, read and unpacked within stated limits, whatever is in it."""
+"""An FMU as an archive: opened, read and unpacked within limits of size and nesting."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_BYTES = 1 << 30
 """Most bytes that are unpacked."""
 MOST_FILES = 100_000
 _PIECE = 1 << 20
-_MOST_SAID = 200
+_LONGEST_MESSAGE = 200
 """Letters of the parser's message, which may repeat what it read."""
 
 
@@ -89,7 +89,7 @@ def xml_root(name: str, content: bytes) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(content)
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two for an encoding that is none
-        raise BadInput(name, Text(str(error)[:_MOST_SAID]), "XML") from None
+        raise BadInput(name, Text(str(error)[:_LONGEST_MESSAGE]), "XML") from None
 
 
 def unpack(path: str | os.PathLike[str], folder: Path) -> None:

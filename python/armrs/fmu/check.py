@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..cosim.library import platform_folder
-from ..cosim.process import Confined, ProcessEnded
 from ..errors import BadInput
-from . import probe, rules, schema
+from . import description_rules, library_probe, schema
 from .archive import DESCRIPTION, archive, read_xml, unpack
-from .content import in_archive, in_terminals
+from .archive_rules import in_archive, in_terminals
+from .confined_process import Confined, ProcessEnded
 from .description import Description, parse
+from .shared_library import platform_folder
 
 _SECONDS = 120.0
 """Longest time that one thing that is tried may take."""
@@ -52,7 +52,7 @@ def check_fmu(path: str | os.PathLike[str], *, library: bool = True, seconds: fl
     The archive, and the XML files in it against the standards' schemas and rules. Then the library is loaded in a process of its own,
     with limits of memory, output and time: the functions of the standard must be there, start values must be those of the description,
     and everything that the description promises for co-simulation is tried. This runs the native code of the FMU with the rights of the
-    user, but for what the limits forbid (`armrs.cosim.limits`).
+    user, but for what the limits forbid (`armrs.fmu.process_limits`).
 
     Parameters
     ----------
@@ -82,13 +82,13 @@ def check_fmu(path: str | os.PathLike[str], *, library: bool = True, seconds: fl
         except BadInput as error:
             found.append(_refused(error))
         if description is not None:
-            found += [Finding("error", place, text) for place, text in rules.broken(description)]
-            found += [Finding("note", place, text) for place, text in rules.worth_knowing(description)]
+            found += [Finding("error", place, text) for place, text in description_rules.broken(description)]
+            found += [Finding("note", place, text) for place, text in description_rules.worth_knowing(description)]
             found += _binary(files, description)
             found += [Finding("error", place, text) for place, text in in_terminals(files, description)]
     if library and description is not None and not any(f.place.startswith("binaries") for f in found):
-        for part in probe.parts(description):
-            found += _tried(Path(path), seconds, part)
+        for part in library_probe.parts(description):
+            found += _probe_findings(Path(path), seconds, part)
     return sorted(dict.fromkeys(found), key=lambda f: f.level != "error")
 
 
@@ -133,7 +133,7 @@ def _binary(files: zipfile.ZipFile, description: Description) -> Iterator[Findin
             yield Finding(level, f"binaries/{place}", f"found {there}, expected {identifier}{suffix}, the name that modelIdentifier gives")
 
 
-def _tried(path: Path, seconds: float, part: int | None) -> list[Finding]:
+def _probe_findings(path: Path, seconds: float, part: int | None) -> list[Finding]:
     """Try the library, or a part of what it promises, in a process of its own, so that its crash is a finding and not ours."""
     folder = Path(tempfile.mkdtemp(prefix="armrs-fmu-"))
     process = None
@@ -141,7 +141,7 @@ def _tried(path: Path, seconds: float, part: int | None) -> list[Finding]:
     step = "starting"
     try:
         unpack(path, folder / "fmu")
-        process = Confined("armrs.cosim.worker", folder)
+        process = Confined("armrs.fmu.worker", folder)
         process.send({"task": "try", "path": str(path), "part": part})
         unlimited = process.receive(seconds).get("unlimited", [])
         found += [Finding("note", "sandbox", str(text)) for text in unlimited]

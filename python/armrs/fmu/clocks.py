@@ -1,4 +1,4 @@
-"""Clocks of FMI 3.0 (sections 2.2.8 and 2.4): rules on their descriptions, and what a library does with them, tried.
+"""Clocks of FMI 3.0 (sections 2.2.8 and 2.4): rules for their descriptions, and tests of the library.
 
 Clocks tick in the event mode of co-simulation and Model Exchange, and activate the partitions of a model in scheduled execution.
 """
@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator
 from ctypes import byref, c_bool, c_double, c_int, c_size_t
 from dataclasses import dataclass, field
 
-from ..cosim.imported import ImportedSlave
-from ..cosim.library import UPDATE_CLOCKS_3
 from ..errors import SlaveError
-from . import values
+from . import variable_access
 from .description import Description, finite
-from .trial import Trial
+from .imported_slave import ImportedSlave
+from .probe_context import ProbeContext
+from .shared_library import UPDATE_CLOCKS_3
 
 Broken = tuple[str, str]
 Call = Callable[..., None]
@@ -55,7 +55,7 @@ class Clock:
     priority: str | None
 
     @property
-    def asked(self) -> bool:
+    def set_by_library(self) -> bool:
         """Whether only the library has the interval."""
         return self.kind in ("changing", "countdown") or (self.kind in _PERIODIC and self.interval is None)
 
@@ -112,36 +112,38 @@ def broken(description: Description) -> Iterator[Broken]:
                 yield f"variable {element.get('name')}", f"clocks refers to {reference}, which is not a clock"
 
 
-def intervals(trial: Trial, call: Call, when: str, kinds: tuple[str, ...] = (*_PERIODIC, "changing", "countdown")) -> dict[str, float]:
+def intervals(
+    probe: ProbeContext, call: Call, when: str, kinds: tuple[str, ...] = (*_PERIODIC, "changing", "countdown")
+) -> dict[str, float]:
     """Query the intervals that only the library has; return them."""
     found = {}
-    for clock in clocks(trial.description):
-        if clock.kind not in kinds or not clock.asked:
+    for clock in clocks(probe.description):
+        if clock.kind not in kinds or not clock.set_by_library:
             continue
         interval, qualifier = c_double(), c_int(-1)
         call("GetIntervalDecimal", _references(clock), c_size_t(1), byref(interval), byref(qualifier))
         if qualifier.value not in (0, 1, _CHANGED):
-            trial.find(
+            probe.find(
                 f"clock {clock.name}", f"its interval has the qualifier {qualifier.value} {when}, allowed is 0, 1 or 2", sort="clocks"
             )
         elif qualifier.value == _CHANGED and not (math.isfinite(interval.value) and interval.value >= 0.0):
-            trial.find(f"clock {clock.name}", f"its interval is {interval.value:g} s {when}, allowed is a number from 0", sort="clocks")
+            probe.find(f"clock {clock.name}", f"its interval is {interval.value:g} s {when}, allowed is a number from 0", sort="clocks")
         elif qualifier.value == _CHANGED:
             found[clock.name] = interval.value
     return found
 
 
-def tick(trial: Trial, call: Call) -> None:
+def tick(probe: ProbeContext, call: Call) -> None:
     """Activate, in the event mode at the start, the clocks that tick then, and query which clocks of the FMU do."""
-    for clock in clocks(trial.description):
+    for clock in clocks(probe.description):
         if clock.causality == "input" and (clock.kind == "triggered" or (clock.kind in _PERIODIC and clock.interval and not clock.shift)):
             call("SetClock", _references(clock), c_size_t(1), byref(c_bool(True)))
-    ticking(trial, call)
+    ticking(probe, call)
 
 
-def ticking(trial: Trial, call: Call) -> None:
+def ticking(probe: ProbeContext, call: Call) -> None:
     """Query which clocks of the FMU tick."""
-    for clock in clocks(trial.description):
+    for clock in clocks(probe.description):
         if clock.causality == "output":
             call("GetClock", _references(clock), c_size_t(1), byref(c_bool()))
 
@@ -150,7 +152,7 @@ def ticking(trial: Trial, call: Call) -> None:
 class _Scheduler:
     """The importer's end of scheduled execution."""
 
-    trial: Trial
+    probe: ProbeContext
     slave: ImportedSlave | None = None
     locked: int = 0
     countdown: dict[str, float] = field(default_factory=dict)
@@ -160,10 +162,10 @@ class _Scheduler:
         if self.slave is None:
             return
         try:
-            ticking(self.trial, self.slave.call)
-            self.countdown |= intervals(self.trial, self.slave.call, "in a clock update", ("countdown",))
+            ticking(self.probe, self.slave.call)
+            self.countdown |= intervals(self.probe, self.slave.call, "in a clock update", ("countdown",))
         except SlaveError as error:
-            self.trial.find("ScheduledExecution", f"a clock update fails: {error}", sort="clock update")
+            self.probe.find("ScheduledExecution", f"a clock update fails: {error}", sort="clock update")
 
     def lock(self) -> None:
         """Begin what must not be interrupted."""
@@ -174,64 +176,64 @@ class _Scheduler:
         self.locked -= 1
 
 
-def scheduled_execution(trial: Trial) -> None:
+def scheduled_execution(probe: ProbeContext) -> None:
     """Initialize an instance for scheduled execution, and activate its partitions when their clocks tick."""
-    flags = trial.description.interfaces.get("ScheduledExecution")
+    flags = probe.description.interfaces.get("ScheduledExecution")
     if flags is None or flags.get("needsExecutionTool") in ("true", "1"):
         return
-    trial.step("creating an instance for scheduled execution")
-    scheduler = _Scheduler(trial)
+    probe.step("creating an instance for scheduled execution")
+    scheduler = _Scheduler(probe)
     without = ctypes.CFUNCTYPE(None)
     callbacks = (UPDATE_CLOCKS_3(scheduler.update), without(scheduler.lock), without(scheduler.unlock))
     try:
-        slave = trial.make(scheduled=callbacks)
+        slave = probe.make(scheduled=callbacks)
     except SlaveError as error:
-        trial.find("library, instantiate", f"scheduled execution is refused: {error}")
+        probe.find("library, instantiate", f"scheduled execution is refused: {error}")
         return
-    values.set_all(trial, slave, values.settable_at_start(trial), "before the initialization")
-    trial.step("initializing for scheduled execution")
-    slave.enter_initialization_mode(trial.start)
-    values.starts(trial, slave)
-    known = intervals(trial, slave.call, "in the initialization")
+    variable_access.set_all(probe, slave, variable_access.settable_at_start(probe), "before the initialization")
+    probe.step("initializing for scheduled execution")
+    slave.enter_initialization_mode(probe.start)
+    variable_access.starts(probe, slave)
+    known = intervals(probe, slave.call, "in the initialization")
     slave.exit_initialization_mode()
     scheduler.slave = slave
-    trial.step("activating the partitions of scheduled execution")
-    for time, clock in _schedule(trial, known):
-        _activate(trial, scheduler, time, clock)
-    for clock in clocks(trial.description):
+    probe.step("activating the partitions of scheduled execution")
+    for time, clock in _schedule(probe, known):
+        _activate(probe, scheduler, time, clock)
+    for clock in clocks(probe.description):
         if (wait := scheduler.countdown.get(clock.name)) is not None:
-            _activate(trial, scheduler, trial.start + 2.0 * trial.size + wait, clock)
-    values.reads(trial, slave)
+            _activate(probe, scheduler, probe.start + 2.0 * probe.size + wait, clock)
+    variable_access.reads(probe, slave)
     slave.terminate()
     slave.free()
 
 
-def _schedule(trial: Trial, known: dict[str, float]) -> list[tuple[float, Clock]]:
+def _schedule(probe: ProbeContext, known: dict[str, float]) -> list[tuple[float, Clock]]:
     """Return the ticks of input clocks within two steps, in the order of times and priorities."""
     ticks = []
-    end = trial.start + 2.0 * trial.size
-    for clock in clocks(trial.description):
+    end = probe.start + 2.0 * probe.size
+    for clock in clocks(probe.description):
         if clock.causality != "input" or (clock.kind in ("changing", "countdown") and clock.name not in known):
             continue
         interval = known.get(clock.name, clock.interval)
         first = known[clock.name] if clock.kind in ("changing", "countdown") else clock.shift or 0.0
         periodic = clock.kind in _PERIODIC and interval is not None and interval > _SHORTEST
-        times = itertools.count(trial.start + first, interval) if periodic and interval else iter([trial.start + first])
+        times = itertools.count(probe.start + first, interval) if periodic and interval else iter([probe.start + first])
         ticks += [(time, clock) for time in itertools.islice(itertools.takewhile(lambda t: t <= end, times), _MOST_TICKS)]
     # What is no number is a finding of the schema.
     return sorted(ticks, key=lambda pair: (pair[0], finite(pair[1].priority) or 0.0))
 
 
-def _activate(trial: Trial, scheduler: _Scheduler, time: float, clock: Clock) -> None:
+def _activate(probe: ProbeContext, scheduler: _Scheduler, time: float, clock: Clock) -> None:
     assert scheduler.slave is not None
     scheduler.locked = 0
     try:
         scheduler.slave.call("ActivateModelPartition", ctypes.c_uint32(clock.reference), c_double(time))
     except SlaveError as error:
-        trial.find(f"clock {clock.name}", f"its partition cannot be activated at {time:g} s: {error}", sort="partition")
+        probe.find(f"clock {clock.name}", f"its partition cannot be activated at {time:g} s: {error}", sort="partition")
     if scheduler.locked:
         text = f"its partition returns with {scheduler.locked} more preemption locks than unlocks"
-        trial.find(f"clock {clock.name}", text, sort="preemption")
+        probe.find(f"clock {clock.name}", text, sort="preemption")
 
 
 def _references(clock: Clock) -> ctypes.Array[ctypes.c_uint32]:

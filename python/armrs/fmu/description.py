@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any
 from xml.etree import ElementTree
 
-from ..cosim.partner import Variable
 from ..errors import BadInput, Text
 from .archive import DESCRIPTION, archive, read_xml, xml_root
+from .slave_interface import Variable
 
 BASE_UNITS = ("kg", "m", "s", "rad")
 _OTHER_UNITS = ("A", "K", "mol", "cd")

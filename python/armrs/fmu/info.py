@@ -1,4 +1,4 @@
-"""The description of an FMU, as plain data and in words."""
+"""The description of an FMU, as plain data and as text."""
 
 from __future__ import annotations
 

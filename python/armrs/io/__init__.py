@@ -1,1 +1,1 @@
-"""Files in and out: data sets, trials, samples, columns, markers, OpenSim, TOML."""
+"""Reading and writing of files: data sets, trials, samples, markers, OpenSim, TOML."""

@@ -1,4 +1,4 @@
-"""C3D files, read by ezc3d in a process of its own: a damaged file can crash that library or keep it busy for ever.
+"""C3D files, read by ezc3d in a process of its own, because a damaged file can crash that library or block it.
 
 Run as a module (`python -m armrs.io.c3d FILE OUT.npz`) it is that process.
 """

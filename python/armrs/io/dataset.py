@@ -17,10 +17,10 @@ from .. import checks
 from ..anthropometry import literature_model
 from ..errors import NO_FILE, ArmrsError, BadInput, BadInputs, Text, nearest
 from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, TrialEntry, load_model
+from ..result_warnings import with_warnings
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
-from ..telling import telling
 from . import files
-from .faults import faults_of
+from .dataset_errors import dataset_errors_of
 from .muscle_activity import joint_activity, mark_activity
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
@@ -196,7 +196,7 @@ def refuse_other_arms(dataset: Dataset) -> None:
         raise BadInput("[[added]]", Text(f"masses worn in some configurations ({worn})"), allowed, file=file)
 
 
-@telling
+@with_warnings
 def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     """Read a data set: check it, bring it to SI units, to forces on the arm, and to uniform time.
 
@@ -358,7 +358,7 @@ def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     try:
         return path, Description.load(path)
     except BadInput as first:
-        raise BadInputs.of(faults_of(path).found or [first]) from None
+        raise BadInputs.of(dataset_errors_of(path).found or [first]) from None
 
 
 def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: str | None = None) -> Path:

@@ -66,9 +66,9 @@ class Markers:
 
         Many programs write a marker that is not seen at exactly 0 0 0: one that is elsewhere in other samples is missing there.
         """
-        return np.mean([self._seen(part.strip()) for part in text.split("+")], axis=0)
+        return np.mean([self._position(part.strip()) for part in text.split("+")], axis=0)
 
-    def _seen(self, name: str) -> np.ndarray:
+    def _position(self, name: str) -> np.ndarray:
         at = self.positions[:, self._index(name)]
         lost = (at == 0.0).all(axis=1)
         elsewhere = np.isfinite(at).all(axis=1) & ~lost

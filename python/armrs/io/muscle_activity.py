@@ -1,4 +1,4 @@
-"""Muscle activity: samples at which a muscle is more active than at rest are not those of a passive arm, and are marked.
+"""Muscle activity from EMG: samples at which a muscle is active are marked, because the arm is not passive there.
 
 The envelope of each channel is its rectified deviation from its mean, averaged over a tenth of a second. Its resting level is the median of
 the session, its scatter the median absolute deviation. What exceeds the level by eight deviations is activity. Torque begins later than

@@ -1,4 +1,4 @@
-"""What no data set can be, whatever the arm is: dead sensors, and angles that contradict those of the robot.
+"""Data that no arm can produce: dead sensors, and angles that contradict those of the robot.
 
 It is checked before any fit, so that a wrong column is named as such and not as a poor fit.
 """
@@ -11,10 +11,10 @@ import numpy as np
 
 from ..errors import BadInput, Text
 from ..model import Model, Robot
-from . import readings
-from .chain import chain_points
+from . import column_conventions
+from .column_conventions import AlternativeConvention
 from .dataset import Dataset
-from .readings import Reading
+from .joint_positions import chain_points
 from .trial import Trial, constant
 
 _FAR = 0.3
@@ -49,7 +49,7 @@ def refuse_implausible(dataset: Dataset) -> None:
     if dataset.model.robot is not None:
         for trial in dataset.trials:
             if trial.robot_q is not None:
-                _refuse_apart(dataset.model, dataset.model.robot, trial)
+                _refuse_hand_off_handle(dataset.model, dataset.model.robot, trial)
 
 
 def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
@@ -63,7 +63,7 @@ def dead_forces(dataset: Dataset) -> Iterator[BadInput]:
                     yield BadInput(f"column {name}", found, allowed, file=trial.file, hint="a dead sensor?")
 
 
-def _refuse_apart(model: Model, robot: Robot, trial: Trial) -> None:
+def _refuse_hand_off_handle(model: Model, robot: Robot, trial: Trial) -> None:
     """Compare where the measured angles put the hand with where the robot's put its handle."""
     assert trial.robot_q is not None
     good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
@@ -128,25 +128,27 @@ def _best_zero(q: np.ndarray, joint: int, apart: Callable[[np.ndarray], float]) 
     return min(sizes), best
 
 
-def _other_reading(model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray, base: np.ndarray) -> tuple[float, Reading | None]:
+def _other_reading(
+    model: Model, robot: Robot, q: np.ndarray, robot_q: np.ndarray, base: np.ndarray
+) -> tuple[float, AlternativeConvention | None]:
     """Return what the angles of arm or robot may be instead, and how far apart hand and handle are then [m]."""
     handle = handle_path(robot, robot_q) - base
-    found: list[tuple[float, Reading | None]] = [
+    found: list[tuple[float, AlternativeConvention | None]] = [
         (_rms(hand_path(model, reading.angles(q)) - handle), reading)
-        for reading in (*readings.of_angles(q.shape[1]), *readings.of_unit_of_one(q))
+        for reading in (*column_conventions.of_angles(q.shape[1]), *column_conventions.of_unit_of_one(q))
     ]
     tip = hand_path(model, q) + base
-    found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in readings.of_robot_angles()]
+    found += [(_rms(tip - handle_path(robot, reading.angles(robot_q))), reading) for reading in column_conventions.of_robot_angles()]
     return min(found, key=lambda item: item[0])
 
 
-def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, Reading | None]:
+def _other_zero(model: Model, q: np.ndarray, handle: np.ndarray) -> tuple[float, AlternativeConvention | None]:
     """Return another zero of one joint's angle, and how far apart hand and handle are with it [m]; None where it is a small error."""
     thin = slice(None, None, max(1, len(q) // 100))
     found = [(_best_zero(q[thin], j, lambda tried: _rms(hand_path(model, tried) - handle[thin])), j + 1) for j in range(q.shape[1])]
     nearest = min(found)[0][0]
     (best, off), joint = min((f for f in found if f[0][0] <= nearest + _PLAINER), key=lambda f: abs(f[0][1]))
-    return best, readings.other_zero(q.shape[1], joint, off) if abs(off) >= OTHER_ZERO else None
+    return best, column_conventions.other_zero(q.shape[1], joint, off) if abs(off) >= OTHER_ZERO else None
 
 
 def hand_meets_handle(dataset: Dataset) -> bool:

@@ -1,4 +1,4 @@
-"""Readers in processes of their own: a damaged file can crash the library of a format, or keep it busy for ever."""
+"""Readers in processes of their own, because a damaged file can crash or block the library of a format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From samples at uneven times, with some missing, to a uniform grid.
+"""Resampling from uneven times with missing samples to a uniform grid.
 
 All channels go through the same interpolation, so that no channel is smoothed or delayed against another. It is the cubic through each
 interval whose end slopes are those of the parabola through three neighbouring samples: exact for parabolas, four samples wide, so that a

@@ -1,4 +1,4 @@
-"""Reading and writing TOML: what armrs needs of it, with refusals on one line."""
+"""Reading and writing TOML; errors are one line."""
 
 from __future__ import annotations
 

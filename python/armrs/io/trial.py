@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import checks, views
+from .. import checks, view_registry
 from ..errors import BadInput, BadInputs, Text, not_later
 from . import columns, resample
 from .samples import Samples, read_samples
@@ -181,7 +181,7 @@ class Trial:
         """
         if model is not None and model.n_joints != self.q.shape[1]:
             raise BadInput("model", Text(f"{model.n_joints} joints"), f"{self.q.shape[1]}, as the trial has")
-        axes: np.ndarray = views.of(self).plot(self, model)
+        axes: np.ndarray = view_registry.of(self).plot(self, model)
         return axes
 
     def pieces(self) -> list[slice]:

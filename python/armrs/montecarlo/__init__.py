@@ -4,5 +4,5 @@ from __future__ import annotations
 
 from .run import Swept as Swept
 from .run import sweep as sweep
-from .spec import Sweep as Sweep
-from .spec import load_sweep as load_sweep
+from .sweep_file import Sweep as Sweep
+from .sweep_file import load_sweep as load_sweep

@@ -1,4 +1,4 @@
-"""One case: draw, simulate, measure, identify. Its rows depend on the sweep and the number of the case alone."""
+"""One case: draw, simulate, measure, identify. Its rows depend only on the sweep and the number of the case."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.quantities import value_in
+from ..analysis.quantity_expressions import value_in
 from ..errors import ArmrsError, one_line
 from ..io.dataset import Dataset
 from ..model import Model
 from ..workflows.identify import Estimate, Identified, identify
 from ..workflows.record import measure
-from .spec import Question, Sweep
+from .sweep_file import Question, Sweep
 
 Row = dict[str, Any]
 _LONGEST_REASON = 300
@@ -49,7 +49,7 @@ def _case(sweep: Sweep, number: int) -> tuple[Row, list[Row]]:
             measured = measure(experiment)
             dataset, truth = measured.dataset, experiment.truth
             row["stopped"] = sum(story["stop"] is not None for story in measured.trials)
-        row |= _seen(dataset)
+        row |= _trial_statistics(dataset)
         if sweep.question is None:
             return row, []
         result = _identify(dataset, sweep.question)
@@ -84,7 +84,7 @@ def _identify(dataset: Dataset, question: Question) -> Identified:
     )
 
 
-def _seen(dataset: Dataset) -> Row:
+def _trial_statistics(dataset: Dataset) -> Row:
     """Return the values of every case on its trials; forces [N]."""
     sizes = [np.hypot(*t.force_on_arm[np.isfinite(t.force_on_arm).all(axis=1)].T) for t in dataset.trials if t.force_on_arm is not None]
     row: Row = {"trials": len(dataset.trials)}

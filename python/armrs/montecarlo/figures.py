@@ -1,4 +1,4 @@
-"""Figures of a sweep: what was found against the truth, and how often intervals hold it."""
+"""Figures of a sweep: estimates against true values, and coverage of the intervals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..report import plotting, tables
+from .. import formatting
+from ..report import plotting
 from ..report.figures import Drawn, Figures, quantity_name
 from .summary import Quantity, Summary
 
@@ -69,7 +70,7 @@ def _legend(figure: Figure, *, truth: bool, cases: bool) -> None:
 
 def _panel(quantity: Quantity, ax: Any) -> None:
     value, truth = np.concatenate(quantity.values), np.concatenate(quantity.truths)
-    there, unit = np.isfinite(value), tables.unit(quantity.unit)
+    there, unit = np.isfinite(value), formatting.unit(quantity.unit)
     held_in = f" [{unit}]" if unit else ""
     ax.locator_params(axis="x", nbins=5)
     known = there & np.isfinite(truth)

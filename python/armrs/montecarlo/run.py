@@ -1,4 +1,4 @@
-"""Running a sweep: what is there already, who computes the rest, and what it all comes to."""
+"""Running a sweep: which cases exist already, which processes compute the others, and the result."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..io import files
 from ..io.samples import parquet_table
 from ..tabular import Tabular, Tidy
 from ..workflows.record import check_required
-from . import results, workers
-from .spec import Sweep, load_sweep
+from . import result_files, workers
 from .store import Store
 from .summary import summarise
+from .sweep_file import Sweep, load_sweep
 
 MOST_JOBS = 1024
 
@@ -134,9 +134,9 @@ def sweep(
         step(spec.cases)
     store.finish()
     summary = summarise(store)
-    data = results.sweep_data(spec, summary, command)
+    data = result_files.sweep_data(spec, summary, command)
     run = {"computed": count, "seconds": time.perf_counter() - began, "largest_process_MB": _largest_process()}
-    written = results.write_sweep(store, data, summary)
+    written = result_files.write_sweep(store, data, summary)
     return Swept(spec, store.final("cases"), store.final("estimates"), data, tuple(written), run)
 
 

@@ -12,7 +12,7 @@ from ..errors import BadInput, Text
 from ..io import files
 from ..io.samples import write_table
 from .case import Row
-from .spec import Sweep
+from .sweep_file import Sweep
 
 KINDS = ("estimates", "cases")
 """The two tables, and their order on the way to the disk; the second is written last, so that where it is, the first is whole."""

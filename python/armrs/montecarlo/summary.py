@@ -1,4 +1,4 @@
-"""What the results of a sweep come to, read from disk in bounded pieces."""
+"""Summary of the results of a sweep, read from disk in bounded pieces."""
 
 from __future__ import annotations
 

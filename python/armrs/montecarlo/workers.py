@@ -1,4 +1,4 @@
-"""Who computes the parts of a sweep: this process, processes beside it, or a Dask cluster. All give the same rows."""
+"""Computing the parts of a sweep: in this process, in processes beside it, or on a Dask cluster. All give the same rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 from .. import _armrs
 from ..errors import ArmrsError, BadInput, Text
 from .case import Row, compute
-from .spec import Sweep
+from .sweep_file import Sweep
 
 Part = tuple[int, int]
 Done = Iterator[tuple[Part, tuple[list[Row], list[Row]]]]

@@ -1,4 +1,4 @@
-"""What a device runs, in Python: the estimator, the compensation and the monitor of the C interface, with its bits in double precision.
+"""What a device runs, in Python: the estimator, the gravity compensation and the monitor of the C interface, with the same bits.
 
 Sample by sample, or over the log of a device: `replay` shows what the device would have learned, refused and carried, and `watch` where
 its monitor would have stopped it.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from .estimator import Compensation, Estimator, Health, OnlineEstimate
 from .log import Log, load_log
+from .log_replay import Replay, replay
 from .monitor import Channel, Monitor, Stop, watch
-from .replaying import Replay, replay
 from .settings import Settings, default_settings
 
 __all__ = [

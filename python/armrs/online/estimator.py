@@ -1,4 +1,4 @@
-"""The estimator and the compensation of the C interface, sample by sample."""
+"""The estimator and the gravity compensation of the C interface, sample by sample."""
 
 from __future__ import annotations
 
@@ -117,8 +117,8 @@ class Estimator(_Carries):
 
     Examples
     --------
-    >>> from armrs.workflows.demo import handed_over, true_model
-    >>> estimator = Estimator(handed_over(true_model()), 1e-3)
+    >>> from armrs.demo import given_model, true_model
+    >>> estimator = Estimator(given_model(true_model()), 1e-3)
     >>> estimator.update([-0.5, 0.4], force_on_arm=[0.0, 12.0])
     'settling'
     >>> estimator.update(None)

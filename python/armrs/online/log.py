@@ -1,4 +1,4 @@
-"""The log of a device: its samples as they were, without resampling, bridging or unwrapping, since the device had none of these."""
+"""The log of a device: its samples as recorded, without resampling, interpolation or unwrapping."""
 
 from __future__ import annotations
 

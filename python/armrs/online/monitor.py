@@ -1,4 +1,4 @@
-"""The safety monitor of the C interface: where it would have stopped a device."""
+"""The safety monitor of the C interface, on a whole log or sample by sample."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How an estimator works: `armrs_settings` of the C interface."""
+"""Settings of the estimator: `armrs_settings` of the C interface."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def default_settings(model: Model | str | os.PathLike[str], period: float, preci
 
     Examples
     --------
-    >>> from armrs.workflows.demo import true_model
+    >>> from armrs.demo import true_model
     >>> default_settings(true_model(), period=1e-3).gate
     8.0
     """

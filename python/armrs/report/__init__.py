@@ -1,1 +1,1 @@
-"""Results as words, tables, figures, pages and files."""
+"""Results as sentences, tables, figures, pages and files."""

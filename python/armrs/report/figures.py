@@ -1,4 +1,4 @@
-"""Whole figures of results: which plots stand together, and the words below them."""
+"""Whole figures of results with their captions."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import formatting
 from ..analysis.joint_coupling import LEAST_HELD, Dependence
 from ..io.trial import Trial
 from ..model import Model
@@ -21,8 +22,8 @@ from ..workflows.passive import PassiveMoments
 from ..workflows.plan import MOST_UNCERTAIN
 from ..workflows.simulate import Run, Simulated
 from . import plotting, tables
-from .animation import points
 from .sketch import sketch
+from .stick_figures import points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,8 +83,8 @@ def _measured_in_joints(data: Mapping[str, Any], joints: Sequence[str]) -> list[
     """Return the result of the measurement for each joint: its number, and words."""
     items = [p for p in data["parameters"] if p["joint"] and p["kind"] not in ("segment", "combination") and p["decided_by"] == "data"]
     return [
-        (p["joint"], f"{joints[p['joint'] - 1]}: {tables.label(p)} {tables.plus_minus(p['value'], p['std'])} "
-         f"{tables.unit(p['unit'])}") for p in items
+        (p["joint"], f"{joints[p['joint'] - 1]}: {tables.label(p)} {formatting.plus_minus(p['value'], p['std'])} "
+         f"{formatting.unit(p['unit'])}") for p in items
     ]  # fmt: skip
 
 
@@ -138,12 +139,12 @@ def _history(courses: Sequence[Mapping[str, Any]], panel: tuple[float, float]) -
     for ax, course in zip(axes, courses, strict=False):
         place = np.arange(len(course["dates"]))
         colour = plotting.ORANGE if course["changed"] else plotting.BLUE
-        factor, held_in = tables.read_followed(course["unit"])
+        factor, held_in = formatting.read_followed(course["unit"])
         values, bars = (factor * np.asarray(course[name]) for name in ("values", "stds"))
         ax.errorbar(place, values, 2.0 * bars, fmt="o-", color=colour, capsize=3)
         ax.margins(y=0.15)
         ax.set_xticks(place, course["dates"], rotation=30, ha="right", fontsize="small")
-        ax.set(title=f"{tables.typeset(tables.course_label(course))}{', changed' if course['changed'] else ''}", ylabel=held_in)
+        ax.set(title=f"{formatting.typeset(formatting.parameter_label(course))}{', changed' if course['changed'] else ''}", ylabel=held_in)
         ax.title.set_fontsize("small")
     for ax in axes[len(courses) :]:
         ax.remove()
@@ -224,7 +225,7 @@ def _planned(predictions: Sequence[Mapping[str, Any]], joints: Sequence[str], co
 def quantity_name(item: Mapping[str, Any], joints: Sequence[str]) -> str:
     """Name a quantity beside an axis."""
     if item["kind"] in ("segment", "combination"):
-        return tables.typeset(item["name"])
+        return formatting.typeset(item["name"])
     return f"{tables.label(item)} {tables.where(item, joints)}".strip()
 
 
@@ -351,7 +352,7 @@ def passive(result: PassiveMoments) -> Figures:
 
 
 def _from_to(values: Sequence[float]) -> str:
-    low, high = tables.digits(min(values)), tables.digits(max(values))
+    low, high = formatting.digits(min(values)), formatting.digits(max(values))
     return low if low == high else f"{low} to {high}"
 
 

@@ -1,4 +1,4 @@
-"""HTML from Jinja2 templates: everything is escaped, and a page may load and run nothing but what is in it."""
+"""HTML from Jinja2 templates: everything is escaped, and a page loads and runs only what it contains."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
 from markupsafe import Markup, escape
 
+from .. import formatting
 from ..errors import BadInput, Text
 from ..io import files
-from . import tables
 
 TEMPLATES = Path(__file__).with_name("templates")
 CONTENTS = Markup("<!-- contents -->")
@@ -71,7 +71,7 @@ def environment(*folders: Path) -> Environment:
         trim_blocks=True,
         keep_trailing_newline=True,
     )
-    engine.filters["typeset"] = tables.typeset
+    engine.filters["typeset"] = formatting.typeset
     engine.filters["breakable"] = _breakable
     return engine
 

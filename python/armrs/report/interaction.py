@@ -1,4 +1,4 @@
-"""Runs with a handle that yields: the force on the arm with and without support, and the stiffness of its tip."""
+"""Figures of runs with a compliant handle: the force on the arm with and without support, and the stiffness at the hand."""
 
 from __future__ import annotations
 

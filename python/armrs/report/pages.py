@@ -16,10 +16,10 @@ from typing import Any
 
 from markupsafe import Markup
 
-from .. import checks, views
+from .. import checks, view_registry
 from ..errors import BadInput, Text
 from ..io import files, jsonfile
-from . import html, live, tables, words
+from . import html, interactive, sentences, tables
 
 INPUT = "SHA-256 of dataset.toml, the model and the trials, one after the other in their order:"
 
@@ -114,7 +114,9 @@ def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathL
     return target
 
 
-def write_page_of(data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], path: Path, moving: live.Live = live.NOTHING) -> Path:
+def write_page_of(
+    data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], path: Path, moving: interactive.Live = interactive.NOTHING
+) -> Path:
     """Write one page about a result that is in memory; `figures` are its pictures by the section that they belong to."""
     engine = html.environment()
     # What a file would hold: NaN is absent there, and arrays are lists.
@@ -137,7 +139,7 @@ def _part(engine: html.Environment, source: Path, number: int) -> Markup:
         figures: defaultdict[str, list[html.Picture]] = defaultdict(list)
         for entry in data.get("figures", []):
             figures[entry.get("section", "")].append(html.picture(entry, source.parent))
-        return _result(engine, data, figures, live.read(data.get("live"), source.parent), number)
+        return _result(engine, data, figures, interactive.read(data.get("live"), source.parent), number)
     except BadInput:
         raise
     except (KeyError, TypeError, AttributeError, ValueError, IndexError, ArithmeticError, html.TemplateError) as error:
@@ -145,7 +147,7 @@ def _part(engine: html.Environment, source: Path, number: int) -> Markup:
 
 
 def _result(
-    engine: html.Environment, data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], moving: live.Live, number: int
+    engine: html.Environment, data: Mapping[str, Any], figures: Mapping[str, list[html.Picture]], moving: interactive.Live, number: int
 ) -> Markup:
     kind = KINDS[data["verb"]]
     values = {
@@ -154,9 +156,9 @@ def _result(
         "data": data,
         "figures": figures,
         "made_by": defaultdict(lambda: None, data.get("made_by", {})),
-        "said": views.words_of(data["verb"]),
+        "said": view_registry.words_of(data["verb"]),
         "tables": tables,
-        "words": words,
+        "words": sentences,
         "contents": html.CONTENTS,
         "number": number,
         **moving.shown(),

@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import tables
+from .. import formatting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -204,7 +204,7 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
     ax.locator_params(axis="x", nbins=6)
-    ax.set_xlabel(f"[{tables.unit(items[0]['unit']) or 'relative'}]" if items else "")
+    ax.set_xlabel(f"[{formatting.unit(items[0]['unit']) or 'relative'}]" if items else "")
     return ax
 
 

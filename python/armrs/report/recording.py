@@ -1,4 +1,4 @@
-"""What was recorded, before anything is computed: the arm in five instants with weight and contact force, and each channel over time."""
+"""A recording before any computation: the arm at five instants with gravity and contact force, and each channel over time."""
 
 from __future__ import annotations
 

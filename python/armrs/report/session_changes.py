@@ -1,4 +1,4 @@
-"""What changed between sessions, in the words of a page for a clinician: how much, and how sure that is."""
+"""Changes between sessions, for the page for a clinician: size and certainty."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from .tables import two_digits
+from ..formatting import two_digits
 
 NO_CHANGE = "no clear change"
 CLEAR = ("higher", "lower")
@@ -54,7 +54,7 @@ def trend(change: float, either_way: float, before: float | None, *, clear: bool
     return f"{'higher' if change > 0.0 else 'lower'} by {abs(change):.{decimals}f} ± {width}{share}"
 
 
-def said(rows: Sequence[Row]) -> list[str]:
+def change_lines(rows: Sequence[Row]) -> list[str]:
     """Return what changed since the session before, what did not, and how sure that is; nothing without a session before."""
     followed = [row for row in rows if row.trend is not None]
     clear = [row for row in followed if row.trend and row.trend.startswith(CLEAR)]

@@ -1,4 +1,4 @@
-"""The arm in the middle of its movements, with what acts on it marked and named: the sketch that heads a report."""
+"""The sketch at the top of a report: the arm in the middle of its movements, with marked effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a result shows itself in Python: the figures of its report, and the report."""
+"""The methods `plot` and `report` of results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
-from . import html, live, pages, plotting
+from . import html, interactive, pages, plotting
 from .figures import Drawn, Figures, draw, shown
 
 
@@ -34,7 +34,7 @@ class View:
 
     data: Callable[[Any], dict[str, Any]]
     figures: Callable[[Any, Mapping[str, Any]], Figures]
-    moving: Callable[[Any], live.Live] = lambda result: live.NOTHING
+    moving: Callable[[Any], interactive.Live] = lambda result: interactive.NOTHING
 
     def plot(self, result: object, name: str | None) -> np.ndarray:
         """Draw one figure where pyplot shows it, and return its Axes."""

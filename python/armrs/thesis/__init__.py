@@ -1,5 +1,5 @@
-"""Every table and figure of the thesis that a machine can recompute: what is printed, what comes out here, and why they differ."""
+"""The tables and figures of the thesis recomputed: printed value, our value, and why they differ."""
 
-from .run import Reproduced, run_reproduce
+from .reproduce import Reproduced, run_reproduce
 
 __all__ = ["Reproduced", "run_reproduce"]

@@ -1,4 +1,4 @@
-"""Who moves how: trajectories of section 3.4 and 3.5 and the bodies of equations 3.14 and 3.20."""
+"""Trajectories of sections 3.4 and 3.5, and the bodies of equations 3.14 and 3.20."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from .. import _armrs
 from ..analysis.passivity_checks import muscles_silent
 from ..io.trial import Trial
 from ..report import plotting
-from ..report.animation import points
 from ..report.figures import Drawn
+from ..report.stick_figures import points
 from ..report.tables import Table
 from ..workflows.record import muscle_activity
 from ..workflows.simulate import Simulated
-from . import drawing
-from .item import Found, Group, Sheet
-from .people import HANDLE, ORTHOSIS, SUBJECT_ONE, TABLE_4_10, arm, mechanical
-from .sessions import ELBOW_HELD, SEED, SHOULDER_HELD, holding, subject_one
-from .simulation import HUMAN_PATH, MECHANICAL_PATH
+from . import shared_figures
+from .report_item import Found, Group, Sheet
+from .simulated_arms import HANDLE, ORTHOSIS, SUBJECT_ONE, TABLE_4_10, arm, mechanical
+from .simulation_comparison import HUMAN_PATH, MECHANICAL_PATH
+from .virtual_sessions import ELBOW_HELD, SEED, SHOULDER_HELD, holding, subject_one
 
 GROUP = Group("movements", "Movements (3.1, 3.4, 3.5)")
 
@@ -36,11 +36,11 @@ def movements() -> Found:
     axes = figure.subplots(2, 2)
     for (above, below), name in zip(axes.T, (holding("shoulder", SHOULDER_HELD[0]), holding("elbow", ELBOW_HELD[0])), strict=True):
         run = session.runs[name]
-        for j, (joint, colour) in enumerate(drawing.JOINTS.items()):
+        for j, (joint, colour) in enumerate(shared_figures.JOINTS.items()):
             above.plot(run.t, np.degrees(run.q[:, j]), plotting.DASHES[j], color=colour, label=joint)
         above.set(title=name + "°", xlabel="time [s]", ylabel="angle [°]")
-        drawing.stick(below, run.model, run.q[: len(run.q) // 2 + 1])
-    drawing.legend(figure, axes[0, 0])
+        shared_figures.stick(below, run.model, run.q[: len(run.q) // 2 + 1])
+    shared_figures.legend(figure, axes[0, 0])
     drift = max(np.ptp(np.degrees(session.runs[holding("shoulder", held)].q[:, 0])) for held in SHOULDER_HELD)
     wrist = max(np.abs(np.degrees(run.q[:, 2])).max() for run in session.runs.values())
     rows = [
@@ -90,7 +90,7 @@ def muscles() -> Found:
     left, right = path.subplots(1, 2, width_ratios=(1.5, 1.0))
     left.plot(run.t, np.degrees(run.q[:, 1]), color=plotting.ORANGE)
     left.set(xlabel="time [s]", ylabel="elbow [°]")
-    drawing.stick(right, run.model, run.q[: len(run.q) // 2 + 1])
+    shared_figures.stick(right, run.model, run.q[: len(run.q) // 2 + 1])
     figure = plotting.figure(9.4, 6.8)
     axes = figure.subplots(4, 2, sharex=True, sharey="row")
     for column, (way, columns) in zip(axes.T, ways.items(), strict=True):
@@ -156,7 +156,7 @@ def small_movements() -> Found:
         strict=True,
     ):
         q = np.linspace(path.waypoints[0], path.waypoints[1], 50)
-        drawing.stick(ax, model, q, title=title)
+        shared_figures.stick(ax, model, q, title=title)
         hand = points(model, q)[:, -1]
         for j, (joint, ends) in enumerate(zip(model.joints, np.cumsum(path.waypoints[:2], axis=1).T, strict=True)):
             low, high = sorted(ends)

@@ -1,4 +1,4 @@
-"""The page: a part of the thesis at a time, every item with what is printed, what we get, and why they differ."""
+"""The page of `armrs reproduce`: every item with the printed value, our value, and why they differ."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .. import formatting
 from ..report import html, tables
-from ..report.animation import drawn
+from ..report.stick_figures import drawn
 
 TEMPLATES = Path(__file__).with_name("templates")
 _NEGATIVE = re.compile(r"-\d")
@@ -32,4 +33,4 @@ def _signed(sheet: Mapping[str, Any]) -> tables.Table:
 
 def _with_minus(cell: Any) -> str | None:
     text = None if cell is None else str(cell)
-    return tables.minus(text) if text and _NEGATIVE.match(text) else text
+    return formatting.minus(text) if text and _NEGATIVE.match(text) else text

@@ -1,1 +1,1 @@
-"""What a user does, a module a verb: simulate, record, passive, identify, plan, history, demo, gap."""
+"""One module per verb: simulate, record, passive, identify, plan, history, gap, and others."""

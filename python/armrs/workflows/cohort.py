@@ -19,11 +19,11 @@ from ..analysis.mixed_model import MixedModel
 from ..errors import ArmrsError, BadInput, Text
 from ..io import files, jsonfile
 from ..io.tomlfile import read_text
-from ..report.plain import passive_data
+from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
-from ..telling import telling
 from .history import holm, session_date, without_date
 from .passive import passive_moments
+from .result_data import passive_data
 
 LEVEL = 0.95
 """Share of sessions that a norm band holds, and probability of the intervals."""
@@ -179,7 +179,7 @@ ALL = "all"
 """The group of those of whom none is stated."""
 
 
-@telling
+@with_warnings
 def cohort(
     source: str | os.PathLike[str],
     *,

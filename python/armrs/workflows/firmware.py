@@ -94,11 +94,11 @@ def export_c(
     loaded = checks.loaded("model", model, Model, load_model)
     digest = hashlib.sha256(loaded.to_toml().encode()).hexdigest()
     vectors = _vectors(loaded.n_joints)
-    told = _armrs.firmware(_armrs.Rig(loaded), loaded.segment_uncertainty, vectors.tolist())
-    effects = [e for e, acts_on in zip(loaded.all_effects, told["acts_on"], strict=True) if acts_on != "sensors"]
-    covariance = _covariance(loaded, told, identified)
-    parts = _Parts(loaded, precision, digest, told, effects, covariance, vectors)
-    return FirmwareSource(parts.header(), parts.source(), vectors, np.array(told["torques"]), digest)
+    core = _armrs.firmware(_armrs.Rig(loaded), loaded.segment_uncertainty, vectors.tolist())
+    effects = [e for e, acts_on in zip(loaded.all_effects, core["acts_on"], strict=True) if acts_on != "sensors"]
+    covariance = _covariance(loaded, core, identified)
+    parts = _Parts(loaded, precision, digest, core, effects, covariance, vectors)
+    return FirmwareSource(parts.header(), parts.source(), vectors, np.array(core["torques"]), digest)
 
 
 def _vectors(joints: int) -> np.ndarray:
@@ -114,32 +114,32 @@ def _vectors(joints: int) -> np.ndarray:
 
 def covariance_of(model: Model, identified: str | os.PathLike[str] | None = None) -> np.ndarray:
     """Return the covariance of the unknowns that `export_c` writes, shape (n_unknowns, n_unknowns)."""
-    return _covariance(model, _told(model), identified)
+    return _covariance(model, _core_firmware(model), identified)
 
 
 def unknowns_of(model: Model) -> list[tuple[str, int, str]]:
     """Return name, joint and unit of the unknowns of a device in their order: first and second moments, then parameters of effects."""
     joints = range(1, model.n_joints + 1)
     base = [(f"X{j}", j, "kg m") for j in joints] + [(f"J{j}", j, "kg m^2") for j in joints]
-    return base + [(f"{e.kind} {p.name}", e.joint or 1, p.unit) for e, p in _linear(model, _told(model))]
+    return base + [(f"{e.kind} {p.name}", e.joint or 1, p.unit) for e, p in _linear(model, _core_firmware(model))]
 
 
-def _told(model: Model) -> _Firmware:
+def _core_firmware(model: Model) -> _Firmware:
     return _armrs.firmware(_armrs.Rig(model), model.segment_uncertainty, [])
 
 
-def _linear(model: Model, told: _Firmware) -> list[tuple[Effect, Any]]:
+def _linear(model: Model, core: _Firmware) -> list[tuple[Effect, Any]]:
     """Return the effects that stay in the joints with each of their linear parameters."""
-    acting = [e for e, acts_on in zip(model.all_effects, told["acts_on"], strict=True) if acts_on == "joints"]
+    acting = [e for e, acts_on in zip(model.all_effects, core["acts_on"], strict=True) if acts_on == "joints"]
     return [(e, p) for e in acting for p in catalogue()[e.kind].parameters if p.linear]
 
 
-def _covariance(model: Model, told: _Firmware, path: str | os.PathLike[str] | None) -> np.ndarray:
+def _covariance(model: Model, core: _Firmware, path: str | os.PathLike[str] | None) -> np.ndarray:
     """Return the covariance of the unknowns: the base parameters, then the linear parameters of the effects."""
     base = 2 * model.n_joints
-    linear = _linear(model, told)
+    linear = _linear(model, core)
     if path is None:
-        return np.diag(np.square([*told["sd"][:base], *(0.0 for _ in linear)]))
+        return np.diag(np.square([*core["sd"][:base], *(0.0 for _ in linear)]))
     result = _result(checks.path("identified", path))
     combinations = result["combinations"]
     if len(combinations) != base:
@@ -188,12 +188,12 @@ class _Parts:
         model: Model,
         precision: str,
         digest: str,
-        told: _Firmware,
+        core: _Firmware,
         effects: list[Effect],
         covariance: np.ndarray,
         vectors: np.ndarray,
     ) -> None:
-        self.model, self.precision, self.digest, self.told = model, precision, digest, told
+        self.model, self.precision, self.digest, self.core = model, precision, digest, core
         self.effects, self.covariance, self.vectors = effects, covariance, vectors
 
     def _guards(self) -> str:
@@ -219,7 +219,7 @@ class _Parts:
 /* Relative standard deviation of masses, centres of mass and inertias, for armrs_estimator_init. */
 #define ARMRS_MODEL_UNCERTAINTY ((armrs_real){self.model.segment_uncertainty!r})
 /* How late the forces are behind the angles [s]: delay the angles by it, or take it into account. */
-#define ARMRS_MODEL_FORCE_DELAY ((armrs_real){self.told["force_delay"]!r})
+#define ARMRS_MODEL_FORCE_DELAY ((armrs_real){self.core["force_delay"]!r})
 /* Motions of the self-test. */
 #define ARMRS_MODEL_VECTORS {len(self.vectors)}
 
@@ -301,7 +301,7 @@ armrs_status armrs_model_arm(armrs_arm *arm, armrs_problem *problem) {{
         return [*given, *[0.0] * (6 - len(given))]
 
     def _compensation(self) -> str:
-        padded = [*self.told["values"], *[0.0] * (18 - len(self.told["values"]))]
+        padded = [*self.core["values"], *[0.0] * (18 - len(self.core["values"]))]
         unknowns = len(self.covariance)
         # Of a symmetric matrix what is below and on the diagonal.
         lower = [self.covariance[i, k] for i in range(unknowns) for k in range(i + 1)]
@@ -320,10 +320,10 @@ armrs_status armrs_model_arm(armrs_arm *arm, armrs_problem *problem) {{
 """
 
     def _calibrate(self) -> str:
-        back = np.linalg.inv(np.array(self.told["force"]))
+        back = np.linalg.inv(np.array(self.core["force"]))
         return f"""void armrs_model_calibrate(armrs_real q[ARMRS_JOINTS], armrs_real force_on_arm[2], armrs_real *moment_on_arm) {{
-  static const armrs_real angle[ARMRS_JOINTS] = {_row(self.told["angle_offset"])};
-  static const armrs_real offset[3] = {_row(self.told["force_offset"])};
+  static const armrs_real angle[ARMRS_JOINTS] = {_row(self.core["angle_offset"])};
+  static const armrs_real offset[3] = {_row(self.core["force_offset"])};
   static const armrs_real back[3][3] = {_rows(back)};
   const armrs_real read[3] = {{force_on_arm[0] - offset[0], force_on_arm[1] - offset[1], *moment_on_arm - offset[2]}};
   armrs_real found[3];
@@ -339,7 +339,7 @@ armrs_status armrs_model_arm(armrs_arm *arm, armrs_problem *problem) {{
         columns = 3 * self.model.n_joints + 3
         close = f"difference <= R({_SINGLE_TOLERANCE!r}) * largest" if self.precision == "single" else "difference == 0"
         return f"""static const armrs_real vectors[ARMRS_MODEL_VECTORS][{columns}] = {_rows(self.vectors)};
-static const armrs_real torques[ARMRS_MODEL_VECTORS][ARMRS_JOINTS] = {_rows(self.told["torques"])};
+static const armrs_real torques[ARMRS_MODEL_VECTORS][ARMRS_JOINTS] = {_rows(self.core["torques"])};
 
 void armrs_model_vector(size_t index, armrs_motion *motion, armrs_load *load, armrs_real torque[ARMRS_JOINTS]) {{
   const armrs_real *from = vectors[index < ARMRS_MODEL_VECTORS ? index : 0];

@@ -15,7 +15,7 @@ from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
 from ..tabular import Framed, Tidy
-from .driven import CoreRun, driven
+from .core_experiment import CoreRun, driven
 from .movement import Movement
 from .simulate import DEFAULT_RATE
 from .stiction import DEFAULT_DT

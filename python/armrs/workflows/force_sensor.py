@@ -1,4 +1,4 @@
-"""A six-axis force sensor between the robot's last link and its handle: `[sensors.six_axis]` of `EXPERIMENT.toml`, and what is made of it.
+"""A six-axis force sensor between the robot's last link and its handle: `[sensors.six_axis]` of `EXPERIMENT.toml`.
 
 Its frame turns with the last link: x along the link towards the handle, y in the plane, counter-clockwise of x, z normal to the plane.
 Points and forces of the plane are complex numbers here, `y + i z` in the base frame and `x + i y` in that of the sensor.

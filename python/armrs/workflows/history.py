@@ -1,4 +1,4 @@
-"""Results of one subject over sessions: a file of SQLite, a test of change, and a plot."""
+"""Results of one subject over sessions: an SQLite file, a test of change, and a plot."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text, show
+from ..formatting import parameter_label
 from ..io import files
 from ..io.dataset import Dataset
-from ..report.tables import course_label
 from ..tabular import Tabular, Tidy
 from .identify import Estimate
 
@@ -136,7 +136,7 @@ class Course:
     @property
     def label(self) -> str:
         """Name for people."""
-        return course_label({"name": self.name, "kind": self.kind, "joint": self.joint})
+        return parameter_label({"name": self.name, "kind": self.kind, "joint": self.joint})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""

@@ -21,11 +21,11 @@ from ..io.muscle_activity import active_kept
 from ..io.plausibility import hand_meets_handle, refuse_implausible
 from ..io.trial import bridged, refuse_moving_base
 from ..model import Effect, Model, Tolerance
+from ..result_warnings import with_warnings
 from ..tabular import SYMBOLS, Labelled, Series, Tabular, Tidy, over_trials
-from ..telling import telling
 from .residuals import Explained as Explained
 from .residuals import Residual, poor_fits, residuals, without_fit
-from .setup import Weight, examine_setup, other_weight
+from .setup_check import Weight, examine_setup, other_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +230,7 @@ class Identified(Tabular, Series):
         return self.result.to_dict()
 
 
-@telling
+@with_warnings
 def identify(
     dataset: Dataset | str | os.PathLike[str],
     *,
@@ -391,7 +391,7 @@ def _identified(built: _armrs.Rig, settings: CoreSettings, dataset: Dataset) -> 
     return found, (f"speeds and accelerations are measured, not simulated: {why}, also with the values that fit the measured motion",)
 
 
-_INERTIA_FELT = 1.0
+_LARGE_INERTIA_SHIFT = 1.0
 """Standard deviations by which neglected inertia may move a first moment before it is reported: as much as everything else together."""
 
 
@@ -401,7 +401,7 @@ def _not_quasi_static(moved: Sequence[float]) -> list[str]:
         f"not quasi-static: inertia, which the cascade neglects, moves the first moment of joint {j} by {shift:.1f} standard deviations; "
         "its interval allows for that, the joint method does without"
         for j, shift in enumerate(moved, 1)
-        if shift > _INERTIA_FELT
+        if shift > _LARGE_INERTIA_SHIFT
     ]
 
 

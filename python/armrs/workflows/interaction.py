@@ -1,4 +1,4 @@
-"""A robot whose handle yields, motors that carry the arm, and forces that perturb it: tables of `EXPERIMENT.toml`, and how a run went."""
+"""Compliant robot, gravity compensation by motors and perturbing forces: tables of `EXPERIMENT.toml`, and their results."""
 
 from __future__ import annotations
 

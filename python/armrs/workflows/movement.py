@@ -1,4 +1,4 @@
-"""Desired movements of an arm's joints, and the files they are read from."""
+"""Desired movements of an arm's joints, and the files that describe them."""
 
 from __future__ import annotations
 

@@ -13,13 +13,13 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..analysis import (
-    directions,
     double_exponential,
     joint_coupling,
     low_pass,
+    motion_direction,
     passivity_checks,
     preconditioning,
-    repeated,
+    repeat_statistics,
     students_t,
     uncertainty,
 )
@@ -28,10 +28,10 @@ from ..io import resample
 from ..io.dataset import Dataset, load_dataset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import FEWEST_SAMPLES, Trial
+from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
-from ..telling import telling
 from .identify import Estimate
-from .setup import find_wrong_setup
+from .setup_check import find_wrong_setup
 
 DEFAULT_CUTOFF = 1.0
 """Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
@@ -41,7 +41,7 @@ DEFAULT_BINS = 24
 """Angle bins over the range of a joint in one configuration."""
 MARGIN = 0.43
 """The low-pass mixes what lies within this time, in periods of its cutoff."""
-APART = np.radians(10.0)
+CENTRES_APART = np.radians(10.0)
 """Repeats whose mean angles differ by more are no repeats of one movement [rad]."""
 CARRIED = (0.05, 20.0)
 """The force carries an arm that is led: its torque along that of the weight, relative to that. Outside of this, unit or side are wrong."""
@@ -286,7 +286,7 @@ def _estimate(name: str, joint: int | None, interval: tuple[float, float], unit:
     return Estimate(name, joint, "passive", 0.5 * (interval[0] + interval[1]), half / 1.96, unit, interval, "data")
 
 
-@telling
+@with_warnings
 def passive_moments(
     dataset: Dataset | str | os.PathLike[str],
     *,
@@ -337,7 +337,7 @@ def passive_moments(
             curve = _curve(dataset, repeats, joint, bins)
             if curve is not None:
                 curves.append(curve)
-            elif any(directions.moves(m.q[:, joint]) for m in repeats):
+            elif any(motion_direction.moves(m.q[:, joint]) for m in repeats):
                 lost.append(f"{joint + 1}")
         if lost:
             warnings.append(
@@ -420,7 +420,7 @@ def trial_moments(dataset: Dataset, trial: Trial, cutoff: float) -> TrialMoments
             inertial[piece] += _carried(unit, angle, _armrs.smooth(np.ascontiguousarray(trial.base[piece]), trial.rate, cutoff)[2])
         moment[piece] = torque - inertial[piece]
     moment[~trial.valid] = np.nan
-    direction = directions.told(q, qd, np.isfinite(moment), round(MARGIN * trial.rate / cutoff))
+    direction = motion_direction.directions(q, qd, np.isfinite(moment), round(MARGIN * trial.rate / cutoff))
     return TrialMoments(trial, q, qd, moment, inertial, direction, seen, sign)
 
 
@@ -453,7 +453,7 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     # A mean over other repeats at the next angle would jump by what differs between them.
     shared = np.isfinite(elastic[np.isfinite(elastic).any(axis=1)]).all(axis=0)
     kept = np.where(shared, 0.0, np.nan) if shared.any() else np.zeros(bins)
-    errors = _systematic(dataset, repeats, joint, edges, repeated.slope(repeated.mean(elastic), edges))
+    errors = _systematic(dataset, repeats, joint, edges, repeat_statistics.slope(repeat_statistics.mean(elastic), edges))
     declared = len(uncertainty.Deviations.of(dataset).vector(dataset.model.n_joints))
     systematic = [part[:declared] for part in errors]
     moved = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
@@ -463,16 +463,16 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
         joint=joint + 1,
         repeats=int(np.isfinite(elastic).any(axis=1).sum()),
         angle=0.5 * (edges[1:] + edges[:-1]),
-        rising=repeated.mean(rising) + kept,
-        falling=repeated.mean(falling) + kept,
-        elastic=repeated.mean(elastic) + kept,
-        elastic_std=repeated.deviation(elastic) + kept,
-        half_width=repeated.mean(half_width) + kept,
-        half_width_std=repeated.deviation(half_width) + kept,
+        rising=repeat_statistics.mean(rising) + kept,
+        falling=repeat_statistics.mean(falling) + kept,
+        elastic=repeat_statistics.mean(elastic) + kept,
+        elastic_std=repeat_statistics.deviation(elastic) + kept,
+        half_width=repeat_statistics.mean(half_width) + kept,
+        half_width_std=repeat_statistics.deviation(half_width) + kept,
         inertial_share=float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2))),
         elastic_repeats=elastic,
         half_width_repeats=half_width,
-        held=np.array([repeated.mean(m.q) for m in repeats]),
+        held=np.array([repeat_statistics.mean(m.q) for m in repeats]),
         elastic_systematic=uncertainty.by_jacobian(systematic[0]),
         half_width_systematic=uncertainty.by_jacobian(systematic[1]),
         elastic_errors=systematic[0],
@@ -489,7 +489,9 @@ def _systematic(
     """
     deviations = uncertainty.Deviations.of(dataset)
     parts = [_shifts(dataset, m, (joint, stiffness), edges, deviations) for m in repeats]
-    rising, falling = (np.array([repeated.mean(errors) for errors in np.stack([part[k] for part in parts], axis=1)]) for k in (0, 1))
+    rising, falling = (
+        np.array([repeat_statistics.mean(errors) for errors in np.stack([part[k] for part in parts], axis=1)]) for k in (0, 1)
+    )
     return 0.5 * (rising + falling), 0.5 * (rising - falling)
 
 
@@ -511,7 +513,7 @@ def _shifts(
 
 def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependence, ...]:
     """Fit every joint that moved in several configurations against the joint next to it, the one before where there are two."""
-    found: dict[tuple[int, int], list[double_exponential.Course]] = {}
+    found: dict[tuple[int, int], list[double_exponential.MomentCurve]] = {}
     for joint in sorted({c.joint for c in curves}):
         own = [c for c in curves if c.joint == joint and _led_by(c)]
         n = own[0].held.shape[1] if own else 1
@@ -525,7 +527,7 @@ def _dependence(curves: Sequence[PassiveCurve]) -> tuple[joint_coupling.Dependen
                 if there.sum() >= 4:
                     known = np.nan_to_num(curve.elastic_errors[:, there].T)
                     course = (curve.angle[there], elastic[there], float(held[adjacent - 1]), curve.configuration, known)
-                    courses.append(double_exponential.Course(*course))
+                    courses.append(double_exponential.MomentCurve(*course))
         found[joint, adjacent] = courses
     return joint_coupling.fit_joints(found, LEVEL)
 
@@ -540,7 +542,7 @@ def _sides(repeats: Sequence[TrialMoments], joint: int, sign: int, edges: np.nda
     broken = np.array([not m.trial.valid.all() for m in repeats])
     moments = np.array([_at_centres(m, joint, sign, edges) for m in repeats])
     signs = np.array([_binned(m, m.sign[:, joint], joint, sign, edges) for m in repeats])
-    return repeated.completed(moments, broken), repeated.completed(signs, broken)
+    return repeat_statistics.completed(moments, broken), repeat_statistics.completed(signs, broken)
 
 
 def _binned(moments: TrialMoments, values: np.ndarray, joint: int, sign: int, edges: np.ndarray) -> np.ndarray:
@@ -569,11 +571,11 @@ def _at_centres(moments: TrialMoments, joint: int, sign: int, edges: np.ndarray)
 def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
     """Return what is odd in the trials of one configuration, a line each: none of it proves an error, and all of it spoils the means."""
     lines = []
-    telling = [m for m in repeats if m.direction.any()]
+    moving = [m for m in repeats if m.direction.any()]
     for m in repeats:
         there = np.isfinite(m.moment).all(axis=1)
         # Where no repeat has a direction, the movement is the cause and not a sensor, and a line on its joints states that.
-        if telling and not m.direction.any():
+        if moving and not m.direction.any():
             lines.append(
                 f"{m.trial.file}: no joint moves long enough to tell its direction: the trial is not used (wrong unit, or a dead sensor?)"
             )
@@ -585,9 +587,9 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
             lines.append(
                 f"{m.trial.file}: the force carries {100 * share:.2g} % of the arm's weight: is it in N, and force_on the right side?"
             )
-    places = np.array([repeated.mean(m.q) for m in repeats])
+    places = np.array([repeat_statistics.mean(m.q) for m in repeats])
     for j, at in enumerate(places[np.isfinite(places).all(axis=1)].T, start=1):
-        if at.size and np.ptp(at) > APART:
+        if at.size and np.ptp(at) > CENTRES_APART:
             where = f"{repeats[0].trial.configuration}: its repeats have joint {j} up to {np.degrees(np.ptp(at)):.3g}° apart"
             lines.append(f"{where}: another unit, swapped columns, or two configurations?")
     return lines

@@ -1,4 +1,4 @@
-"""Before an experiment: how well movements will show each parameter, and movements that show them well."""
+"""Planning an experiment: how well movements determine each parameter, and movements that determine them well."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .._armrs import Slowed as Slowed
 from ..errors import BadInput, Text
 from ..io import files, tomlfile
 from ..model import Model, Tolerance
-from ..report.plain import origin
 from ..tabular import Tabular, Tidy
-from .driven import about
+from .core_experiment import about
 from .experiment import Safety
 from .identify import CoreSettings, effects_of
 from .movement import Movement
+from .result_data import origin
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ def forecast(
     Examples
     --------
     >>> import armrs, numpy as np
-    >>> from armrs.workflows.demo import true_model
+    >>> from armrs.demo import true_model
     >>> out = armrs.Movement(np.radians([[-60, 60], [-48, 60], [-60, 60]]), speed=0.5, acceleration=2.0)
     >>> print(armrs.forecast(true_model(), [out]).predictions[0])
     torque = 0.139 ± 0.0067 N m

@@ -1,4 +1,4 @@
-"""Stretches of one joint at several speeds, and how well they will show its reflex."""
+"""Planning stretches of one joint at several speeds, and how well they determine its reflex."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import checks
 from .._armrs import Prediction
-from ..analysis.stretches import UNITS, Stretch, spread
+from ..analysis.stretch_reflex import UNITS, Stretch, spread
 from ..errors import BadInput, Text
 from ..model import Model
 from .movement import Movement

@@ -1,4 +1,4 @@
-"""The virtual laboratory (thesis figure 3.8): a subject, a robot with its controller, sensors, clocks, and a supervisor that stops it."""
+"""The virtual laboratory (thesis figure 3.8): a subject, a controlled robot, sensors, clocks, and a supervisor that stops it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ..io.samples import write_samples
 from ..io.trial import FEWEST_SAMPLES, Trial
 from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
-from .driven import CoreRun, driven
+from .core_experiment import CoreRun, driven
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
 from .force_sensor import CHANNELS, RobotMotion, digitised
 from .interaction import CONTROL_RATE, Interacted
@@ -218,7 +218,7 @@ def _least_duration(movement: Movement) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _MeasuredRun:
     trial: Trial | None
     markers: Markers | None
     story: dict[str, Any]
@@ -246,7 +246,7 @@ class _Session:
         draw = np.random.default_rng([experiment.seed, 1])
         self.offsets = experiment.devices.marker_offset_m * draw.standard_normal((experiment.truth.n_joints + 1, 2))
 
-    def measure(self, run: Run, number: int, repeat: int) -> _Seen:
+    def measure(self, run: Run, number: int, repeat: int) -> _MeasuredRun:
         """Measure one trial; its random numbers depend on seed, movement and repeat alone."""
         e, devices = self.experiment, self.experiment.devices
         seed = int(np.random.SeedSequence([e.seed, 2, number, repeat]).generate_state(1, np.uint64)[0] >> 11)
@@ -268,7 +268,7 @@ class _Session:
             "stop": _stop(led["stop"], led),
         }
         if story["stop"] is not None:
-            return _Seen(None, None, story)
+            return _MeasuredRun(None, None, story)
         every = round(1.0 / (RECORDING_RATE * DEFAULT_DT))
         path = Trial(
             "",
@@ -292,9 +292,9 @@ class _Session:
         if trial is not None:
             tau, emg = _brakes(true, read.time, devices, draw), _emg(true, read.time, draw) if devices.emg else {}
             trial = dataclasses.replace(trial, tau=tau, emg=emg)
-        return _Seen(trial, markers, story, wrench_on_robot=wrench)
+        return _MeasuredRun(trial, markers, story, wrench_on_robot=wrench)
 
-    def _yield(self, model: Model, run: Run, repeat: int, drawn: tuple[np.random.Generator, np.ndarray, int]) -> _Seen:
+    def _yield(self, model: Model, run: Run, repeat: int, drawn: tuple[np.random.Generator, np.ndarray, int]) -> _MeasuredRun:
         """Measure one trial with a handle that yields; where something carries the arm, run it without that as well."""
         e, devices, (draw, moments, seed) = self.experiment, self.experiment.devices, drawn
         assert e.interaction is not None and model.robot is not None
@@ -316,7 +316,7 @@ class _Session:
             "interaction": _compared(runs, self.experiment),
         }
         if kept.stop is not None:
-            return _Seen(None, None, story, runs)
+            return _MeasuredRun(None, None, story, runs)
         stamps = np.arange(0.0, kept.t[-1], 1.0 / devices.rate_Hz)
         force, robot_q = (np.column_stack([np.interp(stamps, kept.t, c) for c in a.T]) for a in (kept.force_on_arm, kept.robot_q))
         wrench = None
@@ -330,7 +330,7 @@ class _Session:
         if trial is not None and e.support is not None:
             torque = np.column_stack([np.interp(stamps, kept.t, c) for c in kept.support.T])
             trial = dataclasses.replace(trial, tau=torque + (devices.brake_noise_Nm or 0.0) * draw.standard_normal(torque.shape))
-        return _Seen(trial, markers, story, runs, wrench)
+        return _MeasuredRun(trial, markers, story, runs, wrench)
 
     def _sense(
         self, model: Model, moved: RobotMotion, seen: tuple[np.ndarray, np.ndarray, np.ndarray], state: tuple[int, dict[str, Any]]

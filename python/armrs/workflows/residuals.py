@@ -1,4 +1,4 @@
-"""What an identified model leaves of the joint torques, and how much of that is the same in all repeats of a movement."""
+"""Residual torques of an identified model, and the part that all repeats of a movement share."""
 
 from __future__ import annotations
 

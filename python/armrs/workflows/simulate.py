@@ -18,11 +18,11 @@ from .._armrs import Recording as Recording
 from ..errors import BadInput, SimulationError, Text
 from ..io.trial import Trial
 from ..model import Model, load_model
+from ..result_warnings import with_warnings
 from ..tabular import Labelled, Series, Tabular, Tidy
-from ..telling import telling
-from .accuracy import EnergyBalance, energy_balance
-from .driven import CoreDrive, CoreRun, about, driven
+from .core_experiment import CoreDrive, CoreRun, about, driven
 from .movement import Movement
+from .simulation_accuracy import EnergyBalance, energy_balance
 from .stiction import DEFAULT_DT, smoothings, steps_to_try, sticking
 
 CHATTER = 1e-5
@@ -282,7 +282,7 @@ def runaway(pieces: Iterable[Simulated]) -> tuple[str, ...]:
     return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)
 
 
-@telling
+@with_warnings
 def simulate(
     model: Model | str | os.PathLike[str],
     drive: Movement | Trial | None = None,
@@ -348,8 +348,8 @@ def simulate(
 
     def run(step: float) -> Simulated:
         options: dict[str, Any] = {"engine": engine, "integrator": integrator, "rate": rate, "duration": duration, "coupling": coupling}
-        asked = _asked(model, drive, dt=step, start=(start, start_speed), **options)
-        return _run(asked, accuracy, _seeded(sensors, seeds, rate))
+        prepared = _prepared(model, drive, dt=step, start=(start, start_speed), **options)
+        return _run(prepared, accuracy, _seeded(sensors, seeds, rate))
 
     if accuracy is not None:
         return run(1.0 / checks.number("rate", rate, least=SLOWEST, unit="Hz"))
@@ -362,14 +362,14 @@ def simulate(
     return run(last)
 
 
-def _run(asked: _Asked, accuracy: float | None, sensing: tuple[Sensors, list[int]] | None) -> Simulated:
+def _run(prepared: _PreparedRun, accuracy: float | None, sensing: tuple[Sensors, list[int]] | None) -> Simulated:
     """Return a run with the requested step, or with one that keeps an accuracy."""
-    rig = _armrs.Rig(asked.model)
-    with asked.about_drive():
+    rig = _armrs.Rig(prepared.model)
+    with prepared.about_drive():
         if accuracy is None:
-            return asked.recorded(_armrs.simulate(rig, asked.led, asked.core, sensing))
-        raw, dt, error = _armrs.simulate_accurately(rig, asked.led, asked.core, accuracy, sensing)
-    made = asked.recorded(raw)
+            return prepared.recorded(_armrs.simulate(rig, prepared.led, prepared.core, sensing))
+        raw, dt, error = _armrs.simulate_accurately(rig, prepared.led, prepared.core, accuracy, sensing)
+    made = prepared.recorded(raw)
     return dataclasses.replace(made, settings=made.settings | _resolved(dt, accuracy, error))
 
 
@@ -393,11 +393,11 @@ def simulate_in_pieces(
     BadInput, SimulationError
         As `simulate`, and what `take` raises.
     """
-    asked = _asked(
+    prepared = _prepared(
         model, drive, engine=engine, integrator=integrator, dt=dt, rate=rate, duration=duration, coupling=coupling, start=(None, None)
     )
-    with asked.about_drive():
-        _armrs.simulate_in_pieces(_armrs.Rig(model), asked.led, asked.core, samples, lambda raw: take(asked.recorded(raw)))
+    with prepared.about_drive():
+        _armrs.simulate_in_pieces(_armrs.Rig(model), prepared.led, prepared.core, samples, lambda raw: take(prepared.recorded(raw)))
 
 
 def resolve(
@@ -420,9 +420,9 @@ def resolve(
     """
     _check_accuracy(accuracy, dt, engine, integrator)
     step = 1.0 / checks.number("rate", rate, least=SLOWEST, unit="Hz")
-    asked = _asked(model, drive, engine=engine, integrator=integrator, dt=step, rate=rate, start=(None, None), **options)
-    with asked.about_drive():
-        chosen, error = _armrs.resolve(_armrs.Rig(model), asked.led, asked.core, accuracy)
+    prepared = _prepared(model, drive, engine=engine, integrator=integrator, dt=step, rate=rate, start=(None, None), **options)
+    with prepared.about_drive():
+        chosen, error = _armrs.resolve(_armrs.Rig(model), prepared.led, prepared.core, accuracy)
     return _resolved(chosen, accuracy, error)
 
 
@@ -445,7 +445,7 @@ def _check_accuracy(accuracy: float | None, dt: float | None, engine: str, integ
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _PreparedRun:
     """A run as the core takes it."""
 
     model: Model
@@ -468,7 +468,7 @@ class _Asked:
         return Simulated(**_samples(columns), readings=raw.readings, model=self.model, settings=self.settings)
 
 
-def _asked(
+def _prepared(
     model: Model | str | os.PathLike[str],
     drive: Movement | Trial | None,
     *,
@@ -479,7 +479,7 @@ def _asked(
     duration: float | None,
     coupling: str,
     start: tuple[np.ndarray | None, np.ndarray | None],
-) -> _Asked:
+) -> _PreparedRun:
     model = checks.loaded("model", model, Model, load_model)
     checks.choice("coupling", coupling, ("compliant", "rigid"))
     checks.choice("engine", engine, ("native", "rapier"))
@@ -521,7 +521,7 @@ def _asked(
         "rate_Hz": rate,
         "coupling": coupling,
     }
-    return _Asked(model, drive, led, core, settings)
+    return _PreparedRun(model, drive, led, core, settings)
 
 
 def _integrator(given: str | None, engine: str) -> str:

@@ -1,4 +1,4 @@
-"""Spasticity by speed: stretches of one joint, slow to fast, and the reflex that resists the fast ones."""
+"""Stretch reflexes from stretches of one joint at several speeds: `armrs spasticity`."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _armrs, checks
-from ..analysis import stretches
-from ..analysis.directions import LEAST_RANGE
+from ..analysis import stretch_reflex
+from ..analysis.motion_direction import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
-from ..analysis.stretches import Reflex, Stretch
+from ..analysis.stretch_reflex import Reflex, Stretch
 from ..analysis.uncertainty import Deviations, angle_errors, sensitivity
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
@@ -22,8 +22,8 @@ from ..io.muscle_activity import co_contraction, onset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import Trial
 from ..model import Model
+from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
-from ..telling import telling
 from .identify import Estimate
 from .passive import TrialMoments, trial_moments
 
@@ -44,7 +44,7 @@ CATCH_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class StretchSeen:
+class MeasuredStretch:
     """One stretch: the motion of a trial in the direction that is resisted.
 
     Attributes
@@ -90,13 +90,13 @@ class JointReflex:
     joint : int
         From 1.
     reflex : Reflex
-    stretches : tuple of StretchSeen
+    stretches : tuple of MeasuredStretch
         By speed.
     """
 
     joint: int
     reflex: Reflex
-    stretches: tuple[StretchSeen, ...]
+    stretches: tuple[MeasuredStretch, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class Spasticity(Tabular):
     dataset: Dataset = field(repr=False)
 
     method: ClassVar[str] = "spasticity"
-    level: ClassVar[float] = stretches.LEVEL
+    level: ClassVar[float] = stretch_reflex.LEVEL
 
     def __repr__(self) -> str:
         parts = []
@@ -142,7 +142,7 @@ class Spasticity(Tabular):
     def tidy(self) -> Tidy:
         """Return the stretches, one a row."""
         rows = [(j.joint, s) for j in self.joints for s in j.stretches]
-        names = list(StretchSeen.__dataclass_fields__)
+        names = list(MeasuredStretch.__dataclass_fields__)
         columns: dict[str, list[Any]] = {"joint": [joint for joint, _ in rows]}
         units = dict.fromkeys(("peak_moment", "elastic", "resisting", "reflex"), "N m")
         units |= {"speed": "rad/s", "work": "J", "catch_angle": "rad", "catch_speed": "rad/s", "emg_onset": "s", "emg_latency": "s"}
@@ -173,7 +173,7 @@ class Spasticity(Tabular):
         return {"effects": effects, "besides": besides, "stretches": stretched, "cutoff_Hz": self.cutoff, "warnings": list(self.warnings)}
 
 
-@telling
+@with_warnings
 def spasticity(
     dataset: Dataset | str | os.PathLike[str],
     *,
@@ -182,8 +182,8 @@ def spasticity(
 ) -> Spasticity:
     """Find the stretch reflex of every joint that was stretched at several speeds: threshold, gain and latency with intervals.
 
-    See `armrs.analysis.stretches` for the law. The resisting moment is that of `passive_moments`, without its slow low-pass: torque of the
-    contact force, less gravity and inertia by the model.
+    See `armrs.analysis.stretch_reflex` for the law. The resisting moment is that of `passive_moments`, without its slow low-pass: torque of
+    the contact force, less gravity and inertia by the model.
 
     Parameters
     ----------
@@ -224,16 +224,16 @@ def spasticity(
         tell(f"reflexes of the {dataset.model.joints[joint].name}", joint / dataset.model.n_joints)
         own = [(m, s) for m, fine in moments if (s := _stretch(dataset, m, joint, cutoff, fine)) is not None]
         speeds = [float(np.abs(s.qd).max()) for _, s in own]
-        if len(own) < stretches.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):
+        if len(own) < stretch_reflex.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):
             continue
-        fitted = stretches.fit([s for _, s in own])
+        fitted = stretch_reflex.fit([s for _, s in own])
         if fitted is None:
             continue
-        seen = [_seen(m, s, fitted, k, dataset) for k, (m, s) in enumerate(own)]
+        seen = [_measured_stretch(m, s, fitted, k, dataset) for k, (m, s) in enumerate(own)]
         found.append(JointReflex(joint + 1, fitted, tuple(sorted(seen, key=lambda s: s.speed))))
         warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
     if not found:
-        need = f"{stretches.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
+        need = f"{stretch_reflex.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
         raise BadInput("trials", Text("no joint that is stretched at several speeds"), need)
     return Spasticity(tuple(found), cutoff, tuple(warnings), dataset)
 
@@ -290,7 +290,7 @@ def low_pass(rate: float, cutoff: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda values: _armrs.smooth(np.ascontiguousarray(values[:, None]), rate, cutoff)[0][:, 0]
 
 
-def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, session: Dataset) -> StretchSeen:
+def _measured_stretch(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, session: Dataset) -> MeasuredStretch:
     """Return what one stretch of a session shows: from where the joint begins to move in the direction that is resisted, to its turn."""
     along = fitted.direction * stretch.qd
     peak = int(np.argmax(along))
@@ -313,7 +313,7 @@ def _seen(moments: TrialMoments, stretch: Stretch, fitted: Reflex, number: int, 
     # The slow low-pass widens a stretch, and with it the time for which it is beyond the threshold.
     over = fitted.direction * stretch.fine_qd[span] > shape["threshold"].value
     passed = float(stretch.t[first + int(np.argmax(over))]) if over.any() else np.nan
-    return StretchSeen(
+    return MeasuredStretch(
         file=moments.trial.file,
         configuration=moments.trial.configuration,
         speed=float(along[peak]),
@@ -338,6 +338,6 @@ def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
         return [f"{name}: no reflex was found up to {fastest:.2g} rad/s"]
     if threshold.value < 0.02 * fastest:
         said.append(f"{name}: the reflex acts at any speed, which is as well a viscosity in one direction")
-    if latency.interval[1] > 0.95 * stretches.LONGEST:
-        said.append(f"{name}: the latency is not told, up to {stretches.LONGEST:g} s")
+    if latency.interval[1] > 0.95 * stretch_reflex.LONGEST:
+        said.append(f"{name}: the latency is not told, up to {stretch_reflex.LONGEST:g} s")
     return said

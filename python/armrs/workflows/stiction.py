@@ -1,4 +1,4 @@
-"""Which dry friction of a simulated arm is solved as set-valued because the usual step cannot follow it."""
+"""Dry friction that a simulation solves as set-valued, because the usual step cannot resolve the smooth law."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def sticking(model: Model) -> Model:
 
     Examples
     --------
-    >>> from armrs.workflows.demo import true_model
+    >>> from armrs.demo import true_model
     >>> sticking(true_model()) == true_model()
     True
     """
@@ -39,7 +39,7 @@ def sticking(model: Model) -> Model:
     return model.replace(joints=joints, effects=(*of_joints, *(solved.get(e, e) for e in model.effects)))
 
 
-def sticking_said(model: Model) -> tuple[str, ...]:
+def sticking_warnings(model: Model) -> tuple[str, ...]:
     """Return what `sticking` changes in a model, in a line."""
     laws = [f"{law.kind} in joint {law.joint}" for law, _ in _too_steep(model)]
     if not laws:
@@ -48,7 +48,7 @@ def sticking_said(model: Model) -> tuple[str, ...]:
     return (f"{', '.join(laws)}: {why}, so solved as set-valued friction, which sticks.",)
 
 
-def too_steep_said(model: Model, dt: float) -> tuple[str, ...]:
+def too_steep_warnings(model: Model, dt: float) -> tuple[str, ...]:
     """Return what `sticking` would change in a model that is simulated as it is, with steps of `dt` [s], in a line."""
     laws = [f"{law.kind} in joint {law.joint}" for law, _ in _too_steep(model, dt)]
     if not laws:

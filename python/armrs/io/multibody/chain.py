@@ -1,4 +1,4 @@
-"""Chains of hinges in space as arms in a plane: any parallel axes across gravity, any direction of the segments at zero.
+"""A chain of hinges in space as a planar arm: any parallel horizontal axes, any direction of the segments at zero.
 
 Offsets along the axes do not change how the chain moves, and are left out.
 """

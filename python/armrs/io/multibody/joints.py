@@ -1,4 +1,4 @@
-"""What the passive joints of a model amount to, and what no other format holds."""
+"""The joint laws of a model as other formats state them, and what these formats cannot represent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings as laboratories have them: any table, workbook or motion file becomes named columns with units."""
+"""Recordings in the formats of laboratories: any table, workbook or motion file becomes named columns with units."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import BadInput, Text
-from . import matlab, motion, numpy_files, programs, text, workbook
+from . import matlab, numpy_files, self_describing, text_formats, text_table, workbook
 from .table import NoTable as NoTable
 from .table import RawColumn as RawColumn
 from .table import RawTable as RawTable
 
 _READERS: dict[tuple[str, ...], Callable[[Path], RawTable | list[RawTable]]] = {
-    text.SUFFIXES: programs.read_text,
+    text_table.SUFFIXES: text_formats.read_text,
     workbook.SUFFIXES: workbook.read_workbook,
     matlab.SUFFIXES: matlab.read_matlab,
     numpy_files.SUFFIXES: numpy_files.read_archive,
-    motion.PARQUET_SUFFIXES: motion.read_parquet,
-    motion.MOTION_SUFFIXES: motion.read_motion_table,
-    motion.C3D_SUFFIXES: motion.read_c3d_table,
-    motion.TRC_SUFFIXES: motion.read_trc_table,
+    self_describing.PARQUET_SUFFIXES: self_describing.read_parquet,
+    self_describing.MOTION_SUFFIXES: self_describing.read_motion_table,
+    self_describing.C3D_SUFFIXES: self_describing.read_c3d_table,
+    self_describing.TRC_SUFFIXES: self_describing.read_trc_table,
 }
 """By suffix. A new format is one module and one line here."""
 

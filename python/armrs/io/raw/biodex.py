@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...errors import BadInput, Text
-from .cells import grid, number
+from .cell_values import grid, number
 from .table import RawColumn, RawTable
 from .units import unit
 

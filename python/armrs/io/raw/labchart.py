@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .table import RawTable
-from .text import table_of
+from .text_table import table_of
 
 _HEAD = 12
 """Lines in which the titles are searched for."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import BadInput, Text
 from ..markers import Markers
-from .cells import grid
+from .cell_values import grid
 from .table import RawColumn, RawTable
 
 _METRES = {"Meters": 1.0, "Centimeters": 1e-2, "Millimeters": 1e-3}

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...errors import BadInput, Text
 from ..markers import Markers
-from .cells import grid, number
+from .cell_values import grid, number
 from .table import RawColumn, RawTable, column
-from .text import decoded_lines
+from .text_table import decoded_lines
 
 _BESIDE = re.compile(r"^(?P<name>.+)_(?:f_\d+|a)$")
 _PROGRAM = "Qualisys Track Manager"

@@ -1,4 +1,4 @@
-"""Units as people write them, and their factor to SI."""
+"""Spellings of units, with their factors to SI."""
 
 from __future__ import annotations
 

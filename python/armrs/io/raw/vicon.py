@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import BadInput, Text
 from ..markers import METRES, Markers
-from .cells import grid, number
+from .cell_values import grid, number
 from .table import RawColumn, RawTable
 
 _FRAMES = ("Frame", "Sub Frame")

@@ -21,11 +21,11 @@ from ..._armrs import (
     Tried,
     Value,
 )
-from .detecting import detectable
-from .found import GapFound
+from .detectable_effects import detectable
+from .discriminating_movements import separate
+from .gap_result import GapFound
 from .search import find_gap
-from .separating import separate
-from .stages import Calibrated, Compared, calibrate, compare, confirm
+from .single_stages import Calibrated, Compared, calibrate, compare, confirm
 
 __all__ = [
     "Absorbed",

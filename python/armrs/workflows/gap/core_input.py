@@ -12,7 +12,7 @@ from ...errors import BadInput
 from ...io.dataset import Dataset, refuse_other_arms
 from ...io.trial import Trial, bridged
 from ...model import Model, Tolerance
-from .between_samples import unresolved_movements
+from .unresolved_motion import unresolved_movements
 
 
 def is_led(dataset: Dataset) -> bool:

@@ -1,4 +1,4 @@
-"""The gap workflow: where simulation and data disagree, which effect is missing, and what adding it gains."""
+"""The whole gap workflow, `find_gap`: which effect is missing, and how much it reduces the gap."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ...custom_effects import OwnEffect
 from ...errors import SimulationError
 from ...io.dataset import Dataset, load_dataset, naming_trials
 from ...io.muscle_activity import comparable
-from ...telling import telling
-from . import maps, separating, suspicion
+from ...result_warnings import with_warnings
+from . import data_checks, discriminating_movements, residual_maps
 from .core_input import core_settings, core_trials, is_led
-from .found import GapFound
+from .gap_result import GapFound
 
 
-@telling
+@with_warnings
 def find_gap(
     dataset: Dataset | str | os.PathLike[str],
     *,
@@ -81,7 +81,7 @@ def find_gap(
         result = _searched(still, own, threads, progress)
         warned = result.result.replace(warnings=(_torques_instead(error), *result.warnings))
         result = dataclasses.replace(result, result=warned)
-    return separating.separate(result, threads=threads, progress=progress) if separate else result
+    return discriminating_movements.separate(result, threads=threads, progress=progress) if separate else result
 
 
 def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progress: Callable[[str, float], None] | None) -> GapFound:
@@ -89,16 +89,16 @@ def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progres
     settings = core_settings(dataset, led, threads, own)
     columns = core_trials(dataset)
     built = _armrs.Rig(dataset.model, dataset.model.all_effects)
-    warnings = suspicion.examine(dataset, led)
+    warnings = data_checks.examine(dataset, led)
     with naming_trials(dataset.trials):
-        suspicion.refuse_mislabelled(dataset, led, interruptible.call(_armrs.play, built, columns, settings))
+        data_checks.refuse_mislabelled(dataset, led, interruptible.call(_armrs.play, built, columns, settings))
         result = interruptible.call_with_progress(_armrs.find_gap, built, columns, settings, progress=progress)
 
-    def lacking(version: str) -> list[maps.Discrepancy]:
-        return maps.discrepancies(dataset, led, result.trials, version)
+    def lacking(version: str) -> list[residual_maps.Discrepancy]:
+        return residual_maps.discrepancies(dataset, led, result.trials, version)
 
-    looks_like = maps.shape(lacking("amended")) if result.verdict == "unexplained" else None
-    told = result.replace(places=maps.places(lacking("calibrated")), looks_like=looks_like, warnings=(*warnings, *result.warnings))
+    looks_like = residual_maps.shape(lacking("amended")) if result.verdict == "unexplained" else None
+    told = result.replace(places=residual_maps.places(lacking("calibrated")), looks_like=looks_like, warnings=(*warnings, *result.warnings))
     return GapFound(told, dataset)
 
 

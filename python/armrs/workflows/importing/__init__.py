@@ -1,5 +1,5 @@
-"""Own recordings into a data set."""
+"""Conversion of recordings to a data set: `armrs import`."""
 
-from .run import Imported as Imported
-from .run import import_recordings as import_recordings
-from .run import model_file as model_file
+from .run_import import Imported as Imported
+from .run_import import import_recordings as import_recordings
+from .run_import import model_file as model_file

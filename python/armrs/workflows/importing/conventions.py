@@ -1,7 +1,7 @@
-"""How raw angles and forces are counted, read off the balance of the arm.
+"""Angle convention and direction of the force, inferred from the balance of the arm.
 
 For each convention that laboratories use, the torques of the contact force are regressed on gravity, inertia and passive joint laws
-(`armrs.analysis.balance`); the wrong convention leaves most of them unexplained.
+(`armrs.analysis.torque_balance`); the wrong convention leaves most of them unexplained.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis.balance import BALANCED, Motion, motion_of, unexplained
+from ...analysis.torque_balance import BALANCED, Motion, motion_of, unexplained
 from ...errors import BadInput, Text
-from ...io.readings import Reading
+from ...io.column_conventions import AlternativeConvention
 from ...model import Model
 from .recipe import REFERENCES, ZEROS, Convention
 
@@ -161,10 +161,12 @@ def _equivalent(a: Convention, b: Convention, motion: Motion | None) -> bool:
     return bool(np.abs(to_model_angles(motion.q, a) - to_model_angles(motion.q, b)).max() < 1e-3)
 
 
-def _reading(c: Convention, n: int) -> Reading:
+def _reading(c: Convention, n: int) -> AlternativeConvention:
     """Return how a convention makes angles of the model, and the force on the arm, of what was recorded."""
     shift = to_model_angles(np.zeros((1, n)), c)[0]
-    return Reading("", "", to_model_angles(np.eye(n), c).T - shift[:, None], shift, np.eye(2) * (1.0 if c.force_on == "arm" else -1.0))
+    return AlternativeConvention(
+        "", "", to_model_angles(np.eye(n), c).T - shift[:, None], shift, np.eye(2) * (1.0 if c.force_on == "arm" else -1.0)
+    )
 
 
 def to_model_speeds(raw: np.ndarray, convention: Convention) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Which markers show the joints of an arm, by the names that marker sets give them."""
+"""Markers of the joints, by the names of common marker sets."""
 
 from __future__ import annotations
 

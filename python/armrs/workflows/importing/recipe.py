@@ -1,4 +1,4 @@
-"""What an import decided, as `import.toml` keeps it: which column is what, in which unit and convention, and which file is which trial."""
+"""The decisions of an import in `import.toml`: column, unit and convention of each quantity, and the file of each trial."""
 
 from __future__ import annotations
 

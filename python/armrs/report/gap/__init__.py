@@ -1,0 +1,1 @@
+"""Sentences, tables, figures and files of the gap workflow."""
