@@ -140,7 +140,7 @@ NAMED = {
     "crates/arm-gap/src/measurement_model/start.rs": "the torque that holds a joint is a constant moment",
     "crates/arm-model/src/joint.rs": "the keys of a joint are short for effects",
     "crates/arm-py/src/model/parts.rs": "the keys of a joint",
-    "crates/arm-sim/src/models.rs": "samples",
+    "crates/arm-sim/src/experiment/sample_experiments.rs": "samples",
 }
 """Files that name a kind of effect, and why."""
 

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Chain, Lanes, Scalar};
-use arm_sim::reserve_room;
+use arm_sim::reserve_memory;
 use numpy::ndarray::{ArrayD, Dimension, IxDyn};
 use numpy::{
     Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
@@ -51,7 +51,7 @@ impl<'py> Numbers<'py> {
             let found = format!("an array of shape {:?}", array.shape());
             return Err(bad_input(name, found, "a list of numbers, one a segment"));
         }
-        let mut values = room(array.len(), 1)?;
+        let mut values = reserved(array.len(), 1)?;
         values.extend(array.as_array().iter());
         if let Some(at) = values.iter().position(|v| !v.is_finite()) {
             return Err(bad_input(
@@ -117,7 +117,7 @@ impl<'a> Rows<'a> {
         let values = match array.as_array().to_slice() {
             Some(slice) => Cow::Borrowed(slice),
             None => {
-                let mut copy = room(array.len(), 1)?;
+                let mut copy = reserved(array.len(), 1)?;
                 copy.extend(array.as_array().iter());
                 Cow::Owned(copy)
             }
@@ -155,11 +155,11 @@ pub fn by_rows<'a, T: Element + Copy, D: Dimension>(
         .map_or_else(|| Cow::Owned(view.iter().copied().collect()), Cow::Borrowed)
 }
 
-/// Room for rows of `width` numbers, or `MemoryError` with what they need.
-fn room(rows: usize, width: usize) -> PyResult<Vec<f64>> {
-    let mut room = Vec::new();
-    reserve_room(&mut room, rows.saturating_mul(width)).map_err(simulation)?;
-    Ok(room)
+/// Memory for rows of `width` numbers, or `MemoryError` with what they need.
+fn reserved(rows: usize, width: usize) -> PyResult<Vec<f64>> {
+    let mut column = Vec::new();
+    reserve_memory(&mut column, rows.saturating_mul(width)).map_err(simulation)?;
+    Ok(column)
 }
 
 /// The first of many values that is not finite: searched for only where a whole stretch of them is not.
@@ -200,7 +200,7 @@ pub fn over_rows<'py, F: Kernel<K>, const K: usize, const N: usize>(
     }
     let mut shape = F::shape(N);
     let (n, size) = (batch.unwrap_or(1), shape.iter().product::<usize>());
-    let mut out = room(n, size)?;
+    let mut out = reserved(n, size)?;
     out.resize(n * size, 0.0);
     let mut run = || {
         // Longer arms are rare, and code for their lanes long to compile.
@@ -297,7 +297,7 @@ pub fn in_order<'py, const K: usize>(
         let found = format!("{} rows", other.batch.unwrap_or(1));
         return Err(bad_input(other.name, found, &format!("{n} rows")));
     }
-    let mut out = room(n, width)?;
+    let mut out = reserved(n, width)?;
     out.resize(n * width, 0.0);
     for i in 0..n {
         let row = &mut out[i * width..(i + 1) * width];
@@ -310,8 +310,8 @@ pub fn in_order<'py, const K: usize>(
 
 /// Refuses with `MemoryError` what needs more bytes than this process can get, where the system states that.
 #[pyfunction]
-pub fn require_room(needed: u64) -> PyResult<()> {
-    arm_sim::require_room(needed).map_err(simulation)
+pub fn require_memory(needed: u64) -> PyResult<()> {
+    arm_sim::require_memory(needed).map_err(simulation)
 }
 
 /// A table of samples, `(n, M)`.

@@ -54,7 +54,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(signal::smooth, m)?)?;
     m.add_function(wrap_pyfunction!(signal::displacement_of_base, m)?)?;
     m.add_function(wrap_pyfunction!(signal::bounded_least_squares, m)?)?;
-    m.add_function(wrap_pyfunction!(convert::require_room, m)?)?;
+    m.add_function(wrap_pyfunction!(convert::require_memory, m)?)?;
     m.add_function(wrap_pyfunction!(catalogue::effects, m)?)?;
     catalogue::add(m)?;
     m.add_function(wrap_pyfunction!(firmware::firmware, m)?)?;

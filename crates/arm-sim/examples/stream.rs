@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Contact, Joints, Limits, Setup, Shape, models};
 use arm_sim::{
-    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start, models as rigs,
-    simulate,
+    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start,
+    sample_experiments as rigs, simulate,
 };
 
 /// Where the arm is led [°]; `firmware/main.c` has the same.

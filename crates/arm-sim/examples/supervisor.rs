@@ -3,7 +3,9 @@
 //! `cargo run --release -p arm-sim --example supervisor -- 1000`
 
 use arm_core::Shape;
-use arm_sim::{Controller, Experiment, Fault, Safety, SimulationError, control, models};
+use arm_sim::{
+    Controller, Experiment, Fault, Safety, SimulationError, control, sample_experiments,
+};
 
 /// Movements of different reach and speed, of arms with two and three segments in turn.
 fn run(
@@ -14,18 +16,20 @@ fn run(
     let duration = 2.0 + 6.0 * share(1);
     let (a, b) = (10.0 + 20.0 * share(2), 20.0 + 30.0 * share(3));
     let settings = (&Controller::default(), &Safety::default());
-    let robot = models::robot()?;
+    let robot = sample_experiments::robot()?;
     let done = if number.is_multiple_of(2) {
         let ends = ([-60.0, 50.0], [-60.0 + a, 50.0 + b]);
         let arm = arm_core::models::mechanical_arm();
-        let mut e: Experiment<2> = models::led(arm, Shape::Smooth, ends, duration, [0.0; 2])?;
+        let mut e: Experiment<2> =
+            sample_experiments::led(arm, Shape::Smooth, ends, duration, [0.0; 2])?;
         e.robot = Some(robot);
         control(&e, settings, fault, number)?
     } else {
         let ends = ([-68.0, 40.0, 0.0], [-68.0 + a, 40.0 + b, 5.0]);
         let arm = arm_core::models::human_arm();
         let rest = [-1.1, 0.9, 0.05];
-        let mut e: Experiment<3> = models::led(arm, Shape::Trapezoid, ends, duration, rest)?;
+        let mut e: Experiment<3> =
+            sample_experiments::led(arm, Shape::Trapezoid, ends, duration, rest)?;
         e.robot = Some(robot);
         control(&e, settings, fault, number)?
     };

@@ -129,7 +129,7 @@ pub enum SimulationError {
         dt: f64,
     },
     /// More memory than there is.
-    #[error("the result needs {} of memory, {}", Bytes(*needed), room(*available))]
+    #[error("the result needs {} of memory, {}", Bytes(*needed), remaining(*available))]
     Memory {
         /// What it needs \[bytes\].
         needed: u64,
@@ -163,7 +163,7 @@ impl core::fmt::Display for Bytes {
 }
 
 /// How much there is, as text.
-fn room(available: Option<u64>) -> String {
+fn remaining(available: Option<u64>) -> String {
     available.map_or("more than the system gives".to_owned(), |bytes| {
         format!("{} are available", Bytes(bytes))
     })

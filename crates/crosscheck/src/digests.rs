@@ -6,7 +6,7 @@ use arm_core::estimator::{Estimator, Sample, Settings};
 use arm_core::{Chain, Elbow, Equation, Joints, Measured, Real, Robot, Segment};
 use arm_ident::inference::joint_method::{Options, identify};
 use arm_ident::regression::trial::{Model, Trial};
-use arm_sim::{Channel, Integrator, Sensors, digest, models, simulate, simulate_batch};
+use arm_sim::{Channel, Integrator, Sensors, digest, sample_experiments, simulate, simulate_batch};
 
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -20,7 +20,7 @@ pub fn of_values(values: impl IntoIterator<Item = f64>) -> u64 {
 
 /// Four seconds of the mechanical arm, read by sensors: the trial, and the joint angles that follow from the robot's.
 fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
-    let mut experiment = models::mechanical_experiment(4.0, [-0.8, 1.0])?;
+    let mut experiment = sample_experiments::mechanical_experiment(4.0, [-0.8, 1.0])?;
     let robot = Robot::new([0.45, 0.45], [1.0, -0.1], Elbow::Up)?;
     experiment.robot = Some(robot);
     experiment.output_interval = Some(2e-3);
@@ -65,7 +65,7 @@ fn model() -> Outcome<Model<2>> {
         segment_uncertainty: 0.1,
         fitted,
         held: Vec::new(),
-        contact: arm_core::Contact::new([models::STIFFNESS; 2], [0.0; 2]),
+        contact: arm_core::Contact::new([sample_experiments::STIFFNESS; 2], [0.0; 2]),
     })
 }
 
@@ -113,7 +113,7 @@ fn estimation<T: Real>(
 
 /// The digests by their names.
 pub fn digests() -> Outcome<[(&'static str, u64); 7]> {
-    let mut experiment = models::reference()?;
+    let mut experiment = sample_experiments::reference()?;
     let rk4 = digest(&simulate(&experiment)?)?;
     let threads = if cfg!(target_family = "wasm") { 1 } else { 2 };
     let lanes = simulate_batch(&[experiment.clone(), experiment.clone()], threads);

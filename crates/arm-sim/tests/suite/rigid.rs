@@ -14,7 +14,7 @@ fn rigid<const N: usize>(mut experiment: Experiment<N>) -> Experiment<N> {
 
 fn mechanical(duration: f64) -> Experiment<2> {
     let poses = ([-60.0, 50.0], [-40.0, 80.0]);
-    arm_sim::models::led(
+    arm_sim::sample_experiments::led(
         models::mechanical_arm(),
         arm_core::Shape::Smooth,
         poses,
