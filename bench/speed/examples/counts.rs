@@ -1,7 +1,9 @@
 //! Kernels, steps and a session to count the instructions of: `counts WHAT HOW_MANY`; `scripts/counts.py` runs it.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Joints, Load, Pose, Scalar, forward_dynamics, inverse_dynamics, models as arms};
+use arm_core::{
+    Joints, Load, Pose, Scalar, forward_dynamics, inverse_dynamics, sample_arms as arms,
+};
 use arm_gap::data::prepared_session::PreparedSession;
 use arm_sim::{Experiment, Integrator, sample_experiments, simulate};
 use std::hint::black_box;

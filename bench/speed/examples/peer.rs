@@ -5,7 +5,7 @@
 use arm_core::{
     Chain, Joints, Lanes, Load, Plane, Pose, Scalar, forward_dynamics, inverse_dynamics,
 };
-use arm_core::{Segment, models as arms};
+use arm_core::{Segment, sample_arms as arms};
 use arm_ident::cascade::quasi_static::{Cascade, Stream};
 use arm_ident::regression::trial::Model;
 use arm_sim::{

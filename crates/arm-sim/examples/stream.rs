@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Contact, Joints, Limits, Setup, Shape, models};
+use arm_core::{Contact, Joints, Limits, Setup, Shape, sample_arms};
 use arm_sim::{
     Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start,
     sample_experiments as rigs, simulate,
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let file = std::env::args()
         .nth(1)
         .ok_or("the file to write is missing")?;
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let waypoints = WAYPOINTS.map(|q| Joints::from(q.map(f64::to_radians)));
     let limits = [Limits {
         speed: 0.6,

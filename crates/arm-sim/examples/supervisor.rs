@@ -19,14 +19,14 @@ fn run(
     let robot = sample_experiments::robot()?;
     let done = if number.is_multiple_of(2) {
         let ends = ([-60.0, 50.0], [-60.0 + a, 50.0 + b]);
-        let arm = arm_core::models::mechanical_arm();
+        let arm = arm_core::sample_arms::mechanical_arm();
         let mut e: Experiment<2> =
             sample_experiments::led(arm, Shape::Smooth, ends, duration, [0.0; 2])?;
         e.robot = Some(robot);
         control(&e, settings, fault, number)?
     } else {
         let ends = ([-68.0, 40.0, 0.0], [-68.0 + a, 40.0 + b, 5.0]);
-        let arm = arm_core::models::human_arm();
+        let arm = arm_core::sample_arms::human_arm();
         let rest = [-1.1, 0.9, 0.05];
         let mut e: Experiment<3> =
             sample_experiments::led(arm, Shape::Trapezoid, ends, duration, rest)?;

@@ -48,7 +48,7 @@ fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
 
 /// A tenth too heavy, with springs and friction to be found; there is no dry friction, so that bounds bind.
 fn model() -> Outcome<Model<2>> {
-    let truth = arm_core::models::mechanical_arm();
+    let truth = arm_core::sample_arms::mechanical_arm();
     let heavy = truth.segments().map(|s| Segment {
         mass: 1.1 * s.mass,
         inertia: 1.1 * s.inertia,

@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 
 /// What was wrong with a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -31,11 +31,11 @@ use window::Windows;
 
 use core::array::from_fn;
 
-use crate::compensation::GravityCompensation;
-use crate::covariance::Covariance;
+use crate::control::gravity_compensation::GravityCompensation;
 use crate::effect::{MAX_STATES, Motion, States};
-use crate::equation::{Equation, Measured, Needed, Prior};
-use crate::scalar::Real;
+use crate::numeric::covariance::Covariance;
+use crate::numeric::scalar::Real;
+use crate::regression::{Equation, Measured, Needed, Prior};
 use crate::{Invalid, joints};
 
 /// Rows over which the usual size of the unexplained torque is averaged.

@@ -2,8 +2,8 @@
 
 use super::channel::Fault;
 use crate::Joints;
-use crate::equation::Measured;
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
+use crate::regression::Measured;
 
 /// The measurements of one control period.
 #[derive(Clone, Copy, Debug, PartialEq)]

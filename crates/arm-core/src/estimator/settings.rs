@@ -4,7 +4,7 @@ use super::channel::Cutoff;
 use super::sample::Sample;
 use super::schedule::budget;
 use crate::check::{SMALLEST, at_least_zero, finite, ordered, positive};
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 use crate::{Chain, Invalid, Joints};
 
 /// How an estimator works. Made by [`Settings::new`]; every guard has a finite value that fits the arm.

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use arm_core::effect::{Effect, Kind, Local, MAX_STATES, Nature, Part, Place, Values};
-use arm_core::{Contact, Setup, models};
+use arm_core::{Contact, Setup, sample_arms};
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
@@ -204,7 +204,10 @@ fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<u
 
 /// Whether a kind changes the length of a segment.
 fn lengthens(kind: Kind) -> bool {
-    let mut setup = Setup::new(&models::mechanical_arm(), Contact::new([1.0; 2], [0.0; 2]));
+    let mut setup = Setup::new(
+        &sample_arms::mechanical_arm(),
+        Contact::new([1.0; 2], [0.0; 2]),
+    );
     let before = setup.segments[0].length;
     let mut effect = Effect::<f64>::new(kind, 0);
     effect.parameters[0] = 0.5;

@@ -110,7 +110,7 @@ pub(crate) fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N>
 #[cfg(test)]
 mod tests {
     use arm_core::effect::Kind;
-    use arm_core::{Contact, Placement, Plane, Setup, jacobian, models};
+    use arm_core::{Contact, Placement, Plane, Setup, jacobian, sample_arms};
     use arm_ident::regression::trial::Trial;
 
     use nalgebra::Vector3;
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn a_hypothesis_with_the_faults_of_the_sensors_explains_what_they_read_of_a_contact() {
         const RATE: f64 = 100.0;
-        let chain = models::mechanical_arm();
+        let chain = sample_arms::mechanical_arm();
         let faults = [
             Effect::new(Kind::AngleOffset, 1).with(&[0.05]),
             Effect::new(Kind::ForceBias, 1).with(&[-4.0]),

@@ -6,7 +6,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_core::estimator::{Decision, Estimator, Sample, Settings};
 use arm_core::{
     Chain, Contact, Elbow, Equation, Joints, Limits, Measured, Real, Robot, Segment, Setup, Shape,
-    models,
+    sample_arms,
 };
 use arm_ident::inference::estimate::Identified;
 use arm_ident::inference::joint_method::{Options, identify};
@@ -82,7 +82,7 @@ fn batch(found: &Identified<2>) -> Vec<(String, f64, f64)> {
 
 /// The mechanical arm of the thesis with its brakes, led by a robot for 12 s and read by sensors at 1 kHz.
 fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let waypoints: Vec<Joints<f64, 2>> = [
         [-60, 50],
         [-20, 50],

@@ -1,7 +1,7 @@
 //! Documented sample experiments for tests, benchmarks and examples.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Chain, Contact, Elbow, Joints, Robot, Setup, Shape, models};
+use arm_core::{Chain, Contact, Elbow, Joints, Robot, Setup, Shape, sample_arms};
 
 use crate::{Coupling, Drive, Experiment, HandlePath, Movement, SimulationError, Start};
 
@@ -28,7 +28,7 @@ pub fn robot() -> Result<Robot<f64>, SimulationError> {
 pub fn human_experiment(duration: f64, rest: [f64; 3]) -> Result<Experiment<3>, SimulationError> {
     let (from, to) = ([-68.0, 40.0, 0.0], [-56.0, 80.0, 5.0]);
     led(
-        models::human_arm(),
+        sample_arms::human_arm(),
         Shape::Trapezoid,
         (from, to),
         duration,
@@ -46,7 +46,7 @@ pub fn mechanical_experiment(
 ) -> Result<Experiment<2>, SimulationError> {
     let (from, to) = ([-60.0, 50.0], [-40.0, 80.0]);
     led(
-        models::mechanical_arm(),
+        sample_arms::mechanical_arm(),
         Shape::Trapezoid,
         (from, to),
         duration,

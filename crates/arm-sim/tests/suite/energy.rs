@@ -1,7 +1,7 @@
 //! Every joule is accounted for.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Chain, Joints, Limits, Pose, Shape, coriolis_matrix, models as arms};
+use arm_core::{Chain, Joints, Limits, Pose, Shape, coriolis_matrix, sample_arms as arms};
 use arm_sim::{
     Coupling, Drive, Experiment, HandlePath, Integrator, Movement, Recording, sample_experiments,
 };

@@ -1,6 +1,6 @@
 //! A compliant handle, an arm that is carried, and a loop that is stopped where it is not stable.
 
-use arm_core::{Joints, Pose, Shape, gravity, models::mechanical_arm};
+use arm_core::{Joints, Pose, Shape, gravity, sample_arms::mechanical_arm};
 use arm_sim::{
     Controller, Experiment, Interaction, Law, Safety, SimulationError, Support, Yielded, interact,
     sample_experiments,

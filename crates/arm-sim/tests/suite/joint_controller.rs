@@ -10,7 +10,7 @@ use arm_sim::{
 const SOON: u64 = 2;
 
 fn experiment(duration: f64) -> Experiment<2> {
-    let arm = arm_core::models::mechanical_arm();
+    let arm = arm_core::sample_arms::mechanical_arm();
     let (from, to) = ([-60.0, 50.0], [-40.0, 80.0]);
     let mut experiment =
         sample_experiments::led(arm, Shape::Smooth, (from, to), duration, [0.0; 2])

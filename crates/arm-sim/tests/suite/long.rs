@@ -1,7 +1,7 @@
 //! The experiments of tables 4.9 and 4.10 for a minute, and the sign that the thesis prints.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Invalid, Shape, models};
+use arm_core::{Invalid, Shape, sample_arms};
 use arm_sim::{Drive, Experiment, HandlePath, Movement, SimulationError, simulate};
 
 use crate::common::{largest, run};
@@ -85,7 +85,7 @@ fn the_printed_sign_of_viscosity_is_refused() {
 fn a_destabilising_spring_leaves_the_path() {
     let poses = ([-40.0, 50.0, 5.0], [-40.0, 50.0, 5.0]);
     let mut experiment = arm_sim::sample_experiments::led(
-        models::human_arm(),
+        sample_arms::human_arm(),
         Shape::Smooth,
         poses,
         4.0,

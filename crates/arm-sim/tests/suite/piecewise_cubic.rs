@@ -1,6 +1,6 @@
 //! Functions of time from samples, and paths from robot angles and points.
 
-use arm_core::{Limits, Shape, models};
+use arm_core::{Limits, Shape, sample_arms};
 use arm_sim::{HandlePath, Interpolation, Movement, Series};
 
 #[test]
@@ -53,7 +53,7 @@ fn hold_and_linear_are_what_they_say() {
 /// The spline through samples of a smooth path converges to it with the fourth order.
 #[test]
 fn paths_from_the_robot_and_from_points_agree_with_the_arm_path() {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let waypoints =
         [[-68.0f64, 40.0, 0.0], [-56.0, 80.0, 5.0]].map(|q| q.map(f64::to_radians).into());
     let movement = Movement::timed(Shape::Smooth, &waypoints, &[2.0], 0.5).expect("a movement");
@@ -95,7 +95,7 @@ fn the_path_of_an_arm_is_consistent() {
     };
     let movement =
         Movement::within(Shape::Smooth, &waypoints, &[limit; 2], 0.3).expect("a movement");
-    let path = HandlePath::of_arm(models::mechanical_arm(), movement.clone());
+    let path = HandlePath::of_arm(sample_arms::mechanical_arm(), movement.clone());
     let h = 1e-5;
     for i in 1..100 {
         let t = movement.duration() * f64::from(i) / 100.0 + 1e-3;

@@ -64,7 +64,7 @@ fn free_swing() -> Experiment<3> {
 
 /// The human arm of table 4.10, let go with its hand in a handle that stands still.
 fn falling() -> Experiment<3> {
-    let arm = arm_core::models::human_arm();
+    let arm = arm_core::sample_arms::human_arm();
     let q = [-1.1, 0.8, 0.1].into();
     let contact = Contact::new([sample_experiments::STIFFNESS; 2], [25.0; 2]);
     let path = HandlePath::fixed(tip(&arm, &Pose::new(&q))).expect("a point");
@@ -249,7 +249,7 @@ fn a_rigid_coupling_agrees_in_angles_and_force() {
         difference(&rigidly(smooth(4.0)), 0.25e-3),
         [7e-8, 2e-6, 6e-3],
     );
-    let arm = arm_core::models::mechanical_arm();
+    let arm = arm_core::sample_arms::mechanical_arm();
     let path = ([-60.0, 50.0], [-40.0, 80.0]);
     let two = sample_experiments::led(arm, Shape::Smooth, path, 4.0, [0.0; 2])
         .expect("a sample experiment");

@@ -34,7 +34,7 @@ fn read(sensors: &Sensors<1>, recording: &Recording<1>) -> Readings<1> {
 
 fn one_joint() -> Experiment<1> {
     let arm = arm_core::Chain::new(
-        [arm_core::models::mechanical_arm().segments()[0]],
+        [arm_core::sample_arms::mechanical_arm().segments()[0]],
         [0.0; 2],
         [0.0, -9.81],
     );

@@ -1,7 +1,7 @@
 //! The native engine a piece at a time: the same bits, states to come back to, and the energy that a port hands over.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Joints, Pose, gravity, jacobian, models as arms, tip};
+use arm_core::{Joints, Pose, gravity, jacobian, sample_arms as arms, tip};
 use arm_sim::{
     Coupling, Drive, Experiment, HandlePath, Outside, Port, SimulationError, Start, Stepper,
     sample_experiments, simulate,

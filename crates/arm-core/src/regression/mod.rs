@@ -6,7 +6,7 @@ mod torques;
 use crate::effect::{
     ActsOn, Effect, Kind, Motion, Parameter, Place, States, advance_states, any_state,
 };
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 use crate::{Chain, Invalid, Joints, Scalar, check, joints};
 
 /// What is known of an unknown before any data, and what it may never be.

@@ -2,7 +2,7 @@
 
 use crate::check::{at_least_zero, finite, positive};
 use crate::effect::Motion;
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 use crate::{Invalid, Joints, Scalar};
 
 /// What a motion must not exceed.

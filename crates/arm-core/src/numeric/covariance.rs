@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 
 /// Columns that a loop over a triangular matrix takes at once: what is written out costs a third less than one by one.
 const BLOCK: usize = 6;

@@ -3,10 +3,10 @@
 use core::array::from_fn;
 
 use super::{Equation, Measured, Needed};
+use crate::dynamics::kinematics::to_links;
+use crate::dynamics::regressor::link_columns;
 use crate::effect::{Effect, Kind, Motion, States, UnitTorques, resisting_torque};
-use crate::kinematics::to_links;
-use crate::regressor::link_columns;
-use crate::unroll::each;
+use crate::numeric::unroll::each;
 use crate::{Joints, Pose, Scalar, joint_force, joints, static_torque};
 
 impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P, E> {

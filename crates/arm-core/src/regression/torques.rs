@@ -3,9 +3,9 @@
 use core::array::from_fn;
 
 use super::{Equation, Measured};
-use crate::covariance::Covariance;
 use crate::effect::{Motion, States};
-use crate::scalar::Real;
+use crate::numeric::covariance::Covariance;
+use crate::numeric::scalar::Real;
 use crate::{Joints, Pose, Scalar, inverse_dynamics, joints, static_torque};
 
 impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P, E> {

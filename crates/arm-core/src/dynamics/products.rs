@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::gravity::weight_moments;
+use crate::dynamics::gravity::weight_moments;
 use crate::{Chain, Lanes, Plane, Scalar};
 
 /// Products of the parameters of a [`Chain`], computed once for a run.

@@ -3,8 +3,8 @@
 use core::array::from_fn;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use crate::scalar::Scalar;
-use crate::series::{exp, tanh};
+use crate::numeric::scalar::Scalar;
+use crate::numeric::transcendental::{exp, tanh};
 
 /// `L` numbers that are computed with together; each lane has the bits of the same computation in `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! The regressor: inverse dynamics as a linear function of the inertial parameters.
 
-use crate::kinematics::{to_joint_torque, to_links};
+use crate::dynamics::kinematics::{to_joint_torque, to_links};
 use crate::{Chain, JointMatrix, Joints, Pose, Scalar};
 
 /// Derivatives of the joint torques to the base parameters; row = joint, column = link.

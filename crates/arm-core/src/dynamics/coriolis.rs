@@ -1,7 +1,7 @@
 //! Coriolis and centrifugal torques.
 
-use crate::inertia::{link_motion, to_joint_matrix};
-use crate::kinematics::{to_joint_torque, to_links};
+use crate::dynamics::inertia::{link_motion, to_joint_matrix};
+use crate::dynamics::kinematics::{to_joint_torque, to_links};
 use crate::{Chain, JointMatrix, Joints, Pose, Products, Scalar, joints};
 
 /// Derivative of `M_ik` to θ_i; to θ_k it is the opposite.

@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 use crate::{Invalid, check};
 
 /// What a watched channel measures.

@@ -1,7 +1,7 @@
 //! Single numbers as [`Scalar`]s.
 
-use crate::scalar::{Real, Scalar};
-use crate::series::{
+use crate::numeric::scalar::{Real, Scalar};
+use crate::numeric::transcendental::{
     DOUBLE, LARGEST_ANGLES, LARGEST_REDUCED, LEAST_EXPONENT, SATURATED, SINGLE, exp_within,
     far_reduced_sin_cos, far_reduced_sin_cos_single, reduced_sin_cos, tanh_within, turned,
     turned_single,

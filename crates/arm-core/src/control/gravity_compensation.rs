@@ -1,9 +1,9 @@
 //! The torque that carries an arm: its weight and its passive moments, and what that torque may be wrong by.
 
-use crate::covariance::Covariance;
 use crate::effect::{Motion, States};
-use crate::equation::Equation;
-use crate::scalar::Real;
+use crate::numeric::covariance::Covariance;
+use crate::numeric::scalar::Real;
+use crate::regression::Equation;
 use crate::{Invalid, Joints, check};
 
 /// Torques and what they may be wrong by.

@@ -1,6 +1,6 @@
 //! The inertia matrix.
 
-use crate::unroll::each;
+use crate::numeric::unroll::each;
 use crate::{Chain, JointMatrix, Pose, Products, Scalar};
 
 /// Inertia matrix in link angles θ \[kg m²\]: `M_jj = J_j`, `M_ij = a_i (X_j cos(θ_i−θ_j) + H_j sin(θ_i−θ_j))` for i < j.

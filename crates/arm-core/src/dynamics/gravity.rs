@@ -2,7 +2,7 @@
 
 use core::array::from_fn;
 
-use crate::kinematics::to_joint_torque;
+use crate::dynamics::kinematics::to_joint_torque;
 use crate::{Chain, Joints, Pose, Scalar};
 
 /// Row of each link: how its weight and that of all beyond it resist turning \[N m\].

@@ -2,10 +2,10 @@
 
 use core::array::from_fn;
 
-use crate::gravity::link_gravity;
-use crate::inertia::link_motion;
-use crate::kinematics::{to_joint_torque, to_links};
-use crate::unroll::each;
+use crate::dynamics::gravity::link_gravity;
+use crate::dynamics::inertia::link_motion;
+use crate::dynamics::kinematics::{to_joint_torque, to_links};
+use crate::numeric::unroll::each;
 use crate::{Chain, Joints, Plane, Pose, Products, Scalar, joints};
 
 /// What acts on the arm from outside and in its joints.
@@ -56,7 +56,7 @@ fn link_force<T: Scalar, const N: usize>(
 
 /// Joint torques that move the arm with `qd`, `qdd`: `B q̈ + C q̇ + G` \[N m\].
 ///
-/// Equals [`regressor`](crate::regressor) times the base parameters.
+/// Equals [`regressor`](crate::dynamics::regressor) times the base parameters.
 pub fn inverse_dynamics<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,

@@ -1,6 +1,6 @@
 //! Every torque of the equation of motion by itself.
 
-use crate::kinematics::{to_joint_torque, to_links};
+use crate::dynamics::kinematics::{to_joint_torque, to_links};
 use crate::{
     Chain, Joints, Load, Pose, Scalar, centrifugal, coriolis, gravity, joints, link_inertia,
     static_torque,
