@@ -1,9 +1,9 @@
 //! Makes safety monitors.
 
+use arm_capi_online::armrs_status::{self, *};
+use arm_capi_online::call::{given, place};
+use arm_capi_online::held::Held;
 use arm_core::monitor::{Channel, Monitor, Quantity, Times};
-use arm_period::armrs_status::{self, *};
-use arm_period::call::{given, place};
-use arm_period::held::Held;
 
 use crate::refusal::{Refusal, armrs_problem, status_of};
 use crate::{ARMRS_CHANNELS, armrs_monitor, armrs_real};
