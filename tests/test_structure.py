@@ -148,7 +148,7 @@ NAMED = {
 def test_a_kind_of_effect_is_named_in_its_own_file() -> None:
     """Other code asks a kind for its properties, so that a new one needs no more than its file and a line of the catalogue."""
     own = ROOT / "crates" / "arm-core" / "src" / "effect"
-    names = {path.stem for path in own.glob("*.rs")} - {"own", "own_absent"}
+    names = {path.stem for path in own.glob("*.rs")} - {"custom_effect", "custom_effect_absent"}
     kinds = {name.title().replace("_", "") for name in names}
     assert {"Coulomb", "StretchReflex"} <= kinds
     crates = [path for path in RUST if not is_test(path) and own not in path.parents and "examples" not in path.parts]

@@ -15,10 +15,10 @@ use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
+use crate::custom_effects;
 use crate::errors::{bad_input, gap, refused};
-use crate::ident::{Columns, read_trials};
+use crate::identification::{Columns, read_trials};
 use crate::model;
-use crate::own;
 use crate::results::{Alternative, GapResult, Screening, SimulatedTrial};
 use crate::rig::Rig;
 
@@ -73,7 +73,7 @@ impl<'a, 'py> Call<'a, 'py> {
             own: settings
                 .own
                 .iter()
-                .map(|kind| own::kind(kind))
+                .map(|kind| custom_effects::kind(kind))
                 .collect::<PyResult<_>>()?,
             base: Vec::new(),
             start: [[0.0; 3]; N],
@@ -109,7 +109,7 @@ impl<'a, 'py> Call<'a, 'py> {
             let found = work(&mut prepared)?;
             Ok((prepared, found))
         });
-        own::failed()?;
+        custom_effects::failed()?;
         outcome.map_err(gap)
     }
 }
@@ -150,7 +150,7 @@ pub fn play(
         };
         let threads = call.settings.threads;
         let plays = py.detach(|| parallel(threads, files.len(), one));
-        own::failed()?;
+        custom_effects::failed()?;
         let made = |play: Result<core::SimulatedTrial, GapError>| {
             play.map(|trial| SimulatedTrial(trial.into())).map_err(gap)
         };
@@ -327,7 +327,7 @@ pub fn distances(
             found.extend(each);
             Ok(found)
         });
-        own::failed()?;
+        custom_effects::failed()?;
         outcome.map_err(gap)
     }
     let rivals = rivals

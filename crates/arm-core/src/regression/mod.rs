@@ -228,9 +228,9 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
     }
 }
 
-/// Values and descriptions of the linear parameters of an effect; a law of one's own has none that are fitted.
+/// Values and descriptions of the linear parameters of an effect; a user-defined law has none that are fitted.
 fn linear<T: Scalar>(effect: &Effect<T>) -> impl Iterator<Item = (T, &'static Parameter)> {
-    let fitted = !matches!(effect.kind, Kind::Own(_));
+    let fitted = !matches!(effect.kind, Kind::Custom(_));
     let values = effect
         .parameters
         .into_iter()

@@ -152,7 +152,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         }
     }
 
-    /// Adds the torques of laws of one's own: they have no unknowns.
+    /// Adds the torques of user-defined laws: they have no unknowns.
     #[inline]
     pub(super) fn add_own(
         &self,
@@ -160,7 +160,7 @@ impl<T: Scalar, const N: usize, const P: usize, const E: usize> Equation<T, N, P
         memory: &[States<T>; E],
         total: &mut Joints<T, N>,
     ) {
-        let own = |e: &Effect<T>| matches!(e.kind, Kind::Own(_));
+        let own = |e: &Effect<T>| matches!(e.kind, Kind::Custom(_));
         for (effect, states) in self.effects.iter().zip(memory).filter(|(e, _)| own(e)) {
             *total += resisting_torque(core::slice::from_ref(effect), motion, &[*states]);
         }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use arm_core::effect::{Info, Local, MAX_PARAMETERS, OwnLaw, Parameters, Prior};
+use arm_core::effect::{CustomLaw, Info, Local, MAX_PARAMETERS, Parameters, Prior};
 
 /// Number of tables that are kept: a fit returns to shapes it has tried.
 const MOST_TABLES: usize = 24;
@@ -83,7 +83,7 @@ pub type Tabulate = Box<dyn Fn(&[f64]) -> Option<Vec<Vec<f64>>> + Send + Sync>;
 type Key = [u64; MAX_PARAMETERS];
 type Tables = Arc<Vec<Vec<f64>>>;
 
-/// A law of one's own by its tables.
+/// A user-defined law by its tables.
 pub struct Tabulated {
     info: &'static Info,
     prior: Prior,
@@ -150,7 +150,7 @@ impl Tabulated {
     }
 }
 
-impl OwnLaw for Tabulated {
+impl CustomLaw for Tabulated {
     fn info(&self) -> &'static Info {
         self.info
     }

@@ -8,10 +8,12 @@ use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::carrying::{Carried, Carries, add_carried, along, carried, table};
+use super::compensation::{
+    GravityCompensator, TorqueAndSd, along, compensation_torque, push_torque, table,
+};
 use super::rows::{Table, locked, row_of};
 use super::settings::Given;
-use crate::convert::by_rows;
+use crate::arrays::by_rows;
 use crate::errors::invalid;
 use crate::firmware::{DeviceEquation, EFFECTS, UNKNOWNS, with_equation};
 use crate::rig::Rig;
@@ -29,7 +31,7 @@ pub fn statuses() -> Vec<&'static str> {
 }
 
 /// An estimator of some length.
-trait Learns: Carries {
+trait Learns: GravityCompensator {
     fn used(&self) -> usize;
     fn update(&mut self, sample: Option<Read<'_>>) -> SampleStatus;
     /// Values, standard deviations, and what each rests on.
@@ -45,12 +47,12 @@ struct Read<'a> {
     hand: &'a [f64],
 }
 
-impl<T: Real + Send, const N: usize> Carries for Estimator<T, N, UNKNOWNS, EFFECTS> {
+impl<T: Real + Send, const N: usize> GravityCompensator for Estimator<T, N, UNKNOWNS, EFFECTS> {
     fn joints(&self) -> usize {
         N
     }
     fn carry(&self, time: f64, q: &[f64], qd: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
-        carried(time, q, qd, |motion| Estimator::carry(self, motion))
+        compensation_torque(time, q, qd, |motion| Estimator::carry(self, motion))
     }
 }
 
@@ -167,7 +169,7 @@ impl OnlineEstimator {
         time: PyReadonlyArray1<'py, f64>,
         q: Table<'py>,
         qd: Table<'py>,
-    ) -> PyResult<Carried<'py>> {
+    ) -> PyResult<TorqueAndSd<'py>> {
         let estimator = locked(&self.inner);
         along(
             py,
@@ -220,8 +222,8 @@ impl Recorded {
             self.decided.push(decided as u8);
         }
         let n = estimator.joints();
-        let carried = estimator.carry(time, q, &vec![0.0; n]);
-        add_carried(carried, n, [&mut self.torque, &mut self.torque_sd]);
+        let torque = estimator.carry(time, q, &vec![0.0; n]);
+        push_torque(torque, n, [&mut self.torque, &mut self.torque_sd]);
         let (residual, excess, age, restarts) = estimator.health();
         self.residual.extend(residual);
         self.excess.push(excess);

@@ -7,7 +7,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use super::rows::{Table, locked};
-use crate::convert::by_rows;
+use crate::arrays::by_rows;
 use crate::errors::{bad_input, invalid};
 
 /// Channels that the C interface watches.

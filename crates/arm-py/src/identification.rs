@@ -12,7 +12,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
-use crate::convert::rows;
+use crate::arrays::rows;
 use crate::errors::{bad_input, identification, invalid, refused};
 use crate::model;
 use crate::results::Identification;

@@ -10,9 +10,9 @@ use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
-use crate::convert::rows;
+use crate::arrays::rows;
 use crate::errors::{bad_input, identification, simulation};
-use crate::ident::{Settings, model};
+use crate::identification::{Settings, model};
 use crate::results;
 use crate::rig::Rig;
 

@@ -1,6 +1,5 @@
-//! The laboratory: the robot under its controller and supervisor, and what the literature expects of a subject.
+//! The laboratory: the robot under its controllers and supervisor.
 
-use arm_core::anthropometry::{Grip, PARTS, Sex, Subject};
 use arm_core::{Chain, Joints};
 use arm_sim::{Controlled, Controller, Fault, Interaction, Law, Safety, Support, Yielded};
 use numpy::{PyReadonlyArray2, ToPyArray};
@@ -8,12 +7,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arm::{AnyChain, each_short_length};
-use crate::convert::by_rows;
-use crate::errors::{bad_input, invalid, simulation};
-use crate::kernel::joints;
-use crate::online::{Carries, OnlineCompensation};
+use crate::arrays::by_rows;
+use crate::errors::{bad_input, simulation};
+use crate::online::{GravityCompensator, OnlineCompensation};
 use crate::rig::Rig;
-use crate::sim::{Driven, Settings, experiment};
+use crate::row_kernels::joints;
+use crate::simulation::{Driven, Settings, experiment};
 
 /// The robot's controller and what the supervisor allows.
 #[derive(FromPyObject)]
@@ -168,7 +167,7 @@ pub fn interact<'py>(
         rig: &Rig,
         (drive, settings, watch, yielding): (&Driven<'_>, &Settings, &Watch, &Yielding),
         pushed: &[f64],
-        support: Option<(&(dyn Carries + Sync), f64, f64)>,
+        support: Option<(&(dyn GravityCompensator + Sync), f64, f64)>,
     ) -> PyResult<Yielded> {
         let mut experiment = experiment(chain, rig, drive, settings)?;
         experiment.duration += yielding.hold;
@@ -200,7 +199,7 @@ pub fn interact<'py>(
         .as_ref()
         .map(|(arm, share, limit)| (&*arm.get().inner, *share, *limit));
     let done = each_short_length!(&rig.arm.chain, c => run(py, c, rig, given, &pushed, support))?;
-    crate::own::failed()?;
+    crate::custom_effects::failed()?;
     let out = PyDict::new(py);
     out.set_item("time", done.time.to_pyarray(py))?;
     let rows = done.time.len();
@@ -217,44 +216,4 @@ pub fn interact<'py>(
     out.set_item("tracking_error", done.tracking_error)?;
     out.set_item("stop", done.stop.as_ref().map(stopped))?;
     Ok(out)
-}
-
-/// What the literature expects of the segments of an arm: name and (value, standard deviation) of each quantity, by segment.
-///
-/// Lengths [m] may be measured; the others are scaled with height.
-#[pyfunction]
-pub fn literature<'py>(
-    py: Python<'py>,
-    body_mass: f64,
-    height: f64,
-    sex: &str,
-    lengths: Vec<Option<f64>>,
-) -> PyResult<Vec<Bound<'py, PyDict>>> {
-    let sex = match sex {
-        "male" => Sex::Male,
-        "female" => Sex::Female,
-        other => return Err(bad_input("sex", other, "male or female")),
-    };
-    let subject = Subject::new(body_mass, height, sex).map_err(invalid)?;
-    PARTS
-        .iter()
-        .zip(["upper arm", "forearm", "hand"])
-        .zip(lengths)
-        .map(|((&part, name), length)| {
-            let prior = subject
-                .prior(part, length, Grip::Neutral)
-                .map_err(invalid)?;
-            let out = PyDict::new(py);
-            out.set_item("name", name)?;
-            out.set_item("length", prior.length)?;
-            for (key, e) in [
-                ("mass", prior.mass),
-                ("com", prior.com),
-                ("inertia", prior.inertia),
-            ] {
-                out.set_item(key, (e.value, e.sd))?;
-            }
-            Ok(out)
-        })
-        .collect()
 }

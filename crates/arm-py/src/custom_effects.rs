@@ -1,9 +1,11 @@
-//! Kinds of effects of one's own: laws that are Python callables.
+//! User-defined kinds of effects: laws that are Python callables.
 
 use std::cell::RefCell;
 use std::sync::{Mutex, PoisonError};
 
-use arm_core::effect::{Info, Kind, MAX_PARAMETERS, Own, Parameter, Part, Place, Prior, Values};
+use arm_core::effect::{
+    CustomEffect, Info, Kind, MAX_PARAMETERS, Parameter, Part, Place, Prior, Values,
+};
 use arm_gap::candidates::tabulated::{Grid, Tabulated};
 use numpy::ndarray::Array1;
 use numpy::{IntoPyArray, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -15,11 +17,11 @@ use crate::errors::{bad_input, invalid, refused};
 static FAILED: Mutex<Option<PyErr>> = Mutex::new(None);
 
 thread_local! {
-    /// The laws that this thread is asking.
-    static ASKING: RefCell<Vec<&'static str>> = const { RefCell::new(Vec::new()) };
+    /// The laws that this thread evaluates.
+    static EVALUATING: RefCell<Vec<&'static str>> = const { RefCell::new(Vec::new()) };
 }
 
-/// The kind of a name: of the catalogue or of one's own.
+/// The kind of a name: of the catalogue or user-defined.
 pub fn kind(name: &str) -> PyResult<Kind> {
     arm_model::kind(name).map_or_else(|| Kind::named(name).map_err(invalid), Ok)
 }
@@ -32,7 +34,7 @@ pub fn failed() -> PyResult<()> {
 
 /// One parameter: name, unit, smallest and largest value, start, whether the torque is linear in it, and values of a shape
 /// that a search tries.
-type Asked = (String, String, f64, f64, f64, bool, Vec<f64>);
+type DeclaredParameter = (String, String, f64, f64, f64, bool, Vec<f64>);
 
 /// Declares a kind of effect whose law is a callable; see `armrs.own_effect`.
 ///
@@ -50,7 +52,7 @@ pub fn declare(
     name: String,
     summary: String,
     formula: String,
-    parameters: Vec<Asked>,
+    parameters: Vec<DeclaredParameter>,
     grid: (f64, f64, f64, f64, usize, usize),
     tabulate: Py<PyAny>,
 ) -> PyResult<()> {
@@ -79,21 +81,26 @@ pub fn declare(
         states: 0,
     }));
     let me = info.kind;
-    let ask = move |p: &[f64]| {
-        ask_once(me, &tabulate, grid, p)
+    let compute = move |p: &[f64]| {
+        tabulate_once(me, &tabulate, grid, p)
             .map_err(|error| {
                 *FAILED.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
             })
             .ok()
     };
-    let law = Box::leak(Box::new(Tabulated::new(info, prior, grid, Box::new(ask))));
-    arm_model::declare(Kind::Own(Own::new(law))).map_err(refused)
+    let law = Box::leak(Box::new(Tabulated::new(
+        info,
+        prior,
+        grid,
+        Box::new(compute),
+    )));
+    arm_model::declare(Kind::Custom(CustomEffect::new(law))).map_err(refused)
 }
 
 /// The one part of the kind: all linear parameters are its sizes, shapes with values occur with them.
 ///
 /// A kind lives as long as the program, like those of the catalogue: models and results refer to it.
-fn part(parameters: &[Asked]) -> Part {
+fn part(parameters: &[DeclaredParameter]) -> Part {
     let linear = parameters.iter().take_while(|p| p.5).count();
     let sizes: &'static [usize] = leak((0..linear).collect());
     let varying: &'static [usize] = leak((linear..parameters.len()).collect());
@@ -106,7 +113,7 @@ fn part(parameters: &[Asked]) -> Part {
     Part::of(sizes).shaped(leak(shapes)).varying(varying)
 }
 
-fn parameter((name, unit, min, max, default, linear, _): Asked) -> Parameter {
+fn parameter((name, unit, min, max, default, linear, _): DeclaredParameter) -> Parameter {
     Parameter {
         or_zero: false,
         name: name.leak(),
@@ -119,34 +126,39 @@ fn parameter((name, unit, min, max, default, linear, _): Asked) -> Parameter {
 }
 
 /// Calls a law for its table, unless a call is active: one that simulates an arm with this very effect would never end.
-fn ask_once(
+fn tabulate_once(
     me: &'static str,
     tabulate: &Py<PyAny>,
     grid: Grid,
     p: &[f64],
 ) -> PyResult<Vec<Vec<f64>>> {
-    if ASKING.with_borrow(|laws| laws.contains(&me)) {
+    if EVALUATING.with_borrow(|laws| laws.contains(&me)) {
         return Err(bad_input(
             &format!("law of {me}"),
             "a law that simulates an arm with this effect",
             "a function of angle and speed",
         ));
     }
-    ASKING.with_borrow_mut(|laws| laws.push(me));
-    let answer = Python::attach(|py| ask(py, tabulate, grid, p));
-    ASKING.with_borrow_mut(Vec::pop);
-    answer
+    EVALUATING.with_borrow_mut(|laws| laws.push(me));
+    let table = Python::attach(|py| table_of(py, tabulate, grid, p));
+    EVALUATING.with_borrow_mut(Vec::pop);
+    table
 }
 
 fn leak<T>(list: Vec<T>) -> &'static [T] {
     list.leak()
 }
 
-fn ask(py: Python<'_>, tabulate: &Py<PyAny>, grid: Grid, p: &[f64]) -> PyResult<Vec<Vec<f64>>> {
+fn table_of(
+    py: Python<'_>,
+    tabulate: &Py<PyAny>,
+    grid: Grid,
+    p: &[f64],
+) -> PyResult<Vec<Vec<f64>>> {
     let row = |values: Vec<f64>| Array1::from_vec(values).into_pyarray(py);
     let arguments = (row(grid.angles()), row(grid.speeds()), row(p.to_vec()));
-    let answer = tabulate.call1(py, arguments)?;
-    let array: PyReadonlyArray3<'_, f64> = answer.extract(py)?;
+    let table = tabulate.call1(py, arguments)?;
+    let array: PyReadonlyArray3<'_, f64> = table.extract(py)?;
     let [layers, ..] = *array.shape() else {
         return Err(bad_input("law", "no table", "an array"));
     };

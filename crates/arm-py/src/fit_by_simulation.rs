@@ -6,11 +6,11 @@ use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
-use crate::convert::by_rows;
+use crate::arrays::by_rows;
 use crate::errors::{bad_input, identification};
 use crate::results::RunFit;
 use crate::rig::Rig;
-use crate::sim::{Driven, Settings, experiment};
+use crate::simulation::{Driven, Settings, experiment};
 
 /// What was recorded, C-contiguous, and the noise of its channels.
 #[derive(FromPyObject)]
@@ -59,7 +59,7 @@ pub fn fit_by_simulation<'py>(
             force_noise: [recorded.force_noise; 2],
         };
         let outcome = py.detach(|| by_simulation::fit(&experiment, &values, free, 1));
-        crate::own::failed()?;
+        crate::custom_effects::failed()?;
         Ok(RunFit(outcome.map_err(identification)?))
     }
     let free: Vec<Free> = free

@@ -1,6 +1,8 @@
-//! Laws of one's own in the equation of motion, against laws of the catalogue with the same formula.
+//! User-defined laws in the equation of motion, against laws of the catalogue with the same formula.
 
-use arm_core::effect::{Effect, Info, Kind, Local, Own, OwnLaw, Parameter, Parameters, Place};
+use arm_core::effect::{
+    CustomEffect, CustomLaw, Effect, Info, Kind, Local, Parameter, Parameters, Place,
+};
 use arm_core::{Equation, Measured};
 
 use crate::common::Random;
@@ -10,7 +12,7 @@ struct Renamed;
 
 const VISCOUS: Parameter = Parameter::linear("viscosity", "N m s", 0.0, 10.0, 0.0);
 
-impl OwnLaw for Renamed {
+impl CustomLaw for Renamed {
     fn info(&self) -> &'static Info {
         const INFO: Info = Info {
             kind: "thick_oil",
@@ -41,7 +43,10 @@ fn a_law_of_ones_own_is_a_known_torque_of_the_equation() {
         let effects = [a, Effect { index: 1, ..b }, Effect { index: 2, ..c }];
         Equation::<f64, 3, 9, 3>::new(chain, effects).unwrap()
     };
-    let (own, listed) = (with(Kind::Own(Own::new(&RENAMED))), with(viscous));
+    let (own, listed) = (
+        with(Kind::Custom(CustomEffect::new(&RENAMED))),
+        with(viscous),
+    );
     // Nothing of it is fitted.
     assert_eq!((own.used(), listed.used()), (6, 9));
     let (memory, load) = ([[0.0; 3]; 3], Measured::none());

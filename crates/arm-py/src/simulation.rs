@@ -12,7 +12,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
-use crate::convert::{by_rows, rows};
+use crate::arrays::{by_rows, rows};
 use crate::errors::{bad_input, simulation};
 use crate::results::{Readings, Recording as Recorded};
 use crate::rig::Rig;
@@ -119,7 +119,7 @@ pub fn simulate<'py>(
         let experiment = experiment(chain, rig, drive, settings)?;
         let engine = settings.engine()?;
         let outcome = py.detach(|| arm_sim::simulate_with(engine, &experiment));
-        crate::own::failed()?;
+        crate::custom_effects::failed()?;
         recorded(py, &experiment, &outcome.map_err(simulation)?, sensing)
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
@@ -164,7 +164,7 @@ pub fn simulate_accurately<'py>(
         let mut experiment = experiment(chain, rig, drive, settings)?;
         let one = std::slice::from_ref(&experiment);
         let outcome = py.detach(|| arm_sim::simulate_accurately(one, accuracy, 1).remove(0));
-        crate::own::failed()?;
+        crate::custom_effects::failed()?;
         let (recording, resolved) = outcome.map_err(simulation)?;
         experiment.dt = resolved.dt;
         let recorded = recorded(py, &experiment, &recording, sensing)?;
@@ -198,7 +198,7 @@ pub fn resolve<'py>(
             }
         };
         let outcome = py.detach(|| arm_sim::resolve(&experiment, accuracy, &mut go_on));
-        crate::own::failed()?;
+        crate::custom_effects::failed()?;
         let broken_off = || interrupted.unwrap_or_else(|| PyKeyboardInterrupt::new_err(()));
         let resolved = outcome.map_err(simulation)?.ok_or_else(broken_off)?;
         Ok((resolved.dt, resolved.error))
@@ -241,7 +241,7 @@ pub fn simulate_in_pieces<'py>(
         };
         let outcome =
             py.detach(|| arm_sim::simulate_in_pieces(engine, &experiment, samples, &mut give));
-        crate::own::failed()?;
+        crate::custom_effects::failed()?;
         raised.map_or(Ok(()), Err)?;
         outcome.map_err(simulation)
     }

@@ -1,14 +1,14 @@
-//! Without the feature `own` there is no kind but those of the catalogue: this one has no value.
+//! Without the feature `custom-effects` there is no kind but those of the catalogue: this one has no value.
 
 use super::law::{Info, Local, Parameters, States};
 use super::prior::Prior;
 use crate::Scalar;
 
-/// A kind of one's own; none can be made without the feature `own`.
+/// A user-defined kind; none can be made without the feature `custom-effects`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Own {}
+pub enum CustomEffect {}
 
-impl Own {
+impl CustomEffect {
     pub(super) fn info(self) -> &'static Info {
         match self {}
     }

@@ -8,20 +8,20 @@ use pyo3::prelude::*;
 
 use super::rows::{Table, row_of};
 use super::settings::is_single;
-use crate::convert::by_rows;
+use crate::arrays::by_rows;
 use crate::errors::{bad_input, invalid};
 use crate::firmware::{DeviceEquation, EFFECTS, UNKNOWNS, with_equation};
 use crate::rig::Rig;
 
 /// An arm of some length, which gives the torque that carries it.
-pub trait Carries: Send {
+pub trait GravityCompensator: Send {
     fn joints(&self) -> usize;
     /// Torques and standard deviations; None where a device would write none.
     fn carry(&self, time: f64, q: &[f64], qd: &[f64]) -> Option<(Vec<f64>, Vec<f64>)>;
 }
 
 /// As `armrs_motion` and `write_carry`: what is not finite, or not within the envelope, is not written.
-pub(super) fn carried<T: Real, const N: usize>(
+pub(super) fn compensation_torque<T: Real, const N: usize>(
     time: f64,
     q: &[f64],
     qd: &[f64],
@@ -38,10 +38,10 @@ pub(super) fn carried<T: Real, const N: usize>(
 }
 
 /// Torques and standard deviations, one row a row of the motion.
-pub(super) type Carried<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+pub(super) type TorqueAndSd<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// Adds torques and standard deviations to two columns, or that there are none.
-pub(super) fn add_carried(
+pub(super) fn push_torque(
     found: Option<(Vec<f64>, Vec<f64>)>,
     joints: usize,
     to: [&mut Vec<f64>; 2],
@@ -55,12 +55,12 @@ pub(super) fn add_carried(
 
 pub(super) fn along<'py>(
     py: Python<'py>,
-    arm: &dyn Carries,
+    arm: &dyn GravityCompensator,
     [time, q, qd]: [&[f64]; 3],
-) -> PyResult<Carried<'py>> {
+) -> PyResult<TorqueAndSd<'py>> {
     let (n, mut torque, mut sd) = (arm.joints(), Vec::new(), Vec::new());
     for ((time, q), qd) in time.iter().zip(q.chunks(n)).zip(qd.chunks(n)) {
-        add_carried(arm.carry(*time, q, qd), n, [&mut torque, &mut sd]);
+        push_torque(arm.carry(*time, q, qd), n, [&mut torque, &mut sd]);
     }
     Ok((table(py, torque, n)?, table(py, sd, n)?))
 }
@@ -80,12 +80,12 @@ pub(super) fn table<T: numpy::Element>(
 /// An identified arm of some length, and what carries it.
 struct Identified<T, const N: usize>(Compensation<T, N, UNKNOWNS, EFFECTS>);
 
-impl<T: Real + Send, const N: usize> Carries for Identified<T, N> {
+impl<T: Real + Send, const N: usize> GravityCompensator for Identified<T, N> {
     fn joints(&self) -> usize {
         N
     }
     fn carry(&self, time: f64, q: &[f64], qd: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
-        carried(time, q, qd, |motion| {
+        compensation_torque(time, q, qd, |motion| {
             self.0.carry(motion, &[[T::ZERO; MAX_STATES]; EFFECTS])
         })
     }
@@ -94,7 +94,7 @@ impl<T: Real + Send, const N: usize> Carries for Identified<T, N> {
 /// The compiled part of `armrs.online.Compensation`.
 #[pyclass(frozen, module = "armrs._armrs")]
 pub struct OnlineCompensation {
-    pub inner: Box<dyn Carries + Sync>,
+    pub inner: Box<dyn GravityCompensator + Sync>,
 }
 
 #[pymethods]
@@ -114,7 +114,7 @@ impl OnlineCompensation {
         time: PyReadonlyArray1<'py, f64>,
         q: Table<'py>,
         qd: Table<'py>,
-    ) -> PyResult<Carried<'py>> {
+    ) -> PyResult<TorqueAndSd<'py>> {
         along(
             py,
             &*self.inner,
@@ -126,7 +126,7 @@ impl OnlineCompensation {
 fn made<T: Real + Send + Sync, const N: usize>(
     equation: DeviceEquation<T, N>,
     given: &[Vec<f64>],
-) -> PyResult<Box<dyn Carries + Sync>> {
+) -> PyResult<Box<dyn GravityCompensator + Sync>> {
     let used = equation.used();
     if given.len() != used || given.iter().any(|row| row.len() != used) {
         let found = format!("{} rows", given.len());

@@ -12,12 +12,12 @@ use crate::Scalar;
 /// precision of the run.
 ///
 /// ```
-/// use arm_core::effect::{Effect, Info, Kind, Local, Own, OwnLaw, Parameter, Parameters, Place};
+/// use arm_core::effect::{Effect, Info, Kind, Local, CustomEffect, CustomLaw, Parameter, Parameters, Place};
 ///
 /// /// Small magnets hold the joint at equal distances.
 /// struct Detent;
 ///
-/// impl OwnLaw for Detent {
+/// impl CustomLaw for Detent {
 ///     fn info(&self) -> &'static Info {
 ///         const INFO: Info = Info {
 ///             kind: "detent",
@@ -39,12 +39,12 @@ use crate::Scalar;
 /// }
 ///
 /// static DETENT: Detent = Detent;
-/// let kind = Kind::Own(Own::new(&DETENT));
+/// let kind = Kind::Custom(CustomEffect::new(&DETENT));
 /// let effect = Effect::<f64>::new(kind, 1).with(&[0.2]);
 /// assert_eq!(effect.validate(2), Ok(()));
 /// assert_eq!(effect.torque(&Local::moving(0.05, 0.0)), 0.2 * libm::sin(0.5));
 /// ```
-pub trait OwnLaw: Sync {
+pub trait CustomLaw: Sync {
     /// Name, parameters, formula and reference; parameters in which the torque is linear come first.
     fn info(&self) -> &'static Info;
     /// What is known of it before any data.
@@ -63,13 +63,13 @@ pub trait OwnLaw: Sync {
     }
 }
 
-/// A kind of one's own: a law that outlives every run. Two are the same when their names are.
+/// A user-defined kind: a law that outlives every run. Two are the same when their names are.
 #[derive(Clone, Copy)]
-pub struct Own(&'static dyn OwnLaw);
+pub struct CustomEffect(&'static dyn CustomLaw);
 
-impl Own {
+impl CustomEffect {
     /// A kind with a law.
-    pub const fn new(law: &'static dyn OwnLaw) -> Self {
+    pub const fn new(law: &'static dyn CustomLaw) -> Self {
         Self(law)
     }
 
@@ -133,33 +133,33 @@ impl Own {
     }
 }
 
-impl fmt::Debug for Own {
+impl fmt::Debug for CustomEffect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Own({})", self.0.info().kind)
+        write!(f, "Custom({})", self.0.info().kind)
     }
 }
 
-impl PartialEq for Own {
+impl PartialEq for CustomEffect {
     fn eq(&self, other: &Self) -> bool {
         self.0.info().kind == other.0.info().kind
     }
 }
 
-impl Eq for Own {}
+impl Eq for CustomEffect {}
 
-impl Hash for Own {
+impl Hash for CustomEffect {
     fn hash<H: Hasher>(&self, state: &mut H) {
         self.0.info().kind.hash(state);
     }
 }
 
-impl PartialOrd for Own {
+impl PartialOrd for CustomEffect {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Own {
+impl Ord for CustomEffect {
     fn cmp(&self, other: &Self) -> Ordering {
         self.0.info().kind.cmp(other.0.info().kind)
     }

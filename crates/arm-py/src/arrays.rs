@@ -14,7 +14,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::errors::{bad_input, simulation};
-use crate::kernel::{Kernel, MOST};
+use crate::row_kernels::{Kernel, MOST};
 
 /// Anything NumPy can read as real numbers; what is none is refused where the name of the argument is known.
 pub struct Numbers<'py>(PyResult<PyReadonlyArrayDyn<'py, f64>>);
