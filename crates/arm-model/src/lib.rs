@@ -53,7 +53,7 @@ mod value;
 pub use catalogue::{declare, kind, kinds};
 pub use contact::Contact;
 pub use dataset::{AddedMass, Description, ForceOn, Muscle, Role, TrialEntry};
-pub use effect::{Channel, Effect, Site};
+pub use effect::{Effect, ForceChannel, Site};
 pub use fields::{Bounds, Fields};
 pub use joint::{Joint, joint_laws};
 pub use model::{MAX_SEGMENTS, Model, Parts};

@@ -1,7 +1,9 @@
 //! The laboratory: the robot under its controllers and supervisor.
 
 use arm_core::{Chain, Joints};
-use arm_sim::{Controlled, Controller, Fault, Interaction, Law, Safety, Support, Yielded};
+use arm_sim::{
+    Controlled, Controller, InjectedFault, Interaction, InteractionLaw, Safety, Support, Yielded,
+};
 use numpy::{PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -64,8 +66,8 @@ pub struct Yielding {
 impl Yielding {
     fn core(&self) -> PyResult<Interaction> {
         let law = match self.law.as_str() {
-            "impedance" => Law::Impedance,
-            "admittance" => Law::Admittance,
+            "impedance" => InteractionLaw::Impedance,
+            "admittance" => InteractionLaw::Admittance,
             other => return Err(bad_input("law", other, "impedance or admittance")),
         };
         Ok(Interaction {
@@ -78,16 +80,16 @@ impl Yielding {
     }
 }
 
-fn fault(kind: &str, joint: usize, size: (f64, f64)) -> PyResult<Fault> {
+fn fault(kind: &str, joint: usize, size: (f64, f64)) -> PyResult<InjectedFault> {
     if joint > 1 {
         return Err(bad_input("fault, joint", joint + 1, "1 or 2"));
     }
     match kind {
-        "runaway" => Ok(Fault::Runaway(joint)),
-        "frozen" => Ok(Fault::Frozen(joint)),
-        "nan" => Ok(Fault::NotANumber(joint)),
-        "late" => Ok(Fault::Late(size.0)),
-        "force" => Ok(Fault::Pressed(size.into())),
+        "runaway" => Ok(InjectedFault::Runaway(joint)),
+        "frozen" => Ok(InjectedFault::Frozen(joint)),
+        "nan" => Ok(InjectedFault::NotANumber(joint)),
+        "late" => Ok(InjectedFault::Late(size.0)),
+        "force" => Ok(InjectedFault::Pressed(size.into())),
         other => Err(bad_input(
             "fault, kind",
             other,

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use arm_core::{Chain, Joints, Limits, Shape};
 use arm_sim::{
-    Channel, Coupling, Drive, Engine, Experiment, HandlePath, Integrator, Interpolation, Movement,
-    Piece, Sensors, Series, Start,
+    Coupling, Drive, Engine, Experiment, HandlePath, Integrator, Interpolation, Movement, Piece,
+    SensorChannel, Sensors, Series, Start,
 };
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -82,7 +82,7 @@ pub struct Sensing {
 
 impl Sensing {
     fn sensors<const N: usize>(&self, seed: u64) -> Sensors<N> {
-        let channel = |of: &Limited| Channel {
+        let channel = |of: &Limited| SensorChannel {
             deviation: of.deviation,
             correlation_time: of.correlation_time,
             range: of.range,

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Contact, Joints, Limits, Setup, Shape, sample_arms};
 use arm_sim::{
-    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start,
+    Coupling, Drive, Experiment, HandlePath, Movement, SensorChannel, Sensors, Start,
     sample_experiments as rigs, simulate,
 };
 
@@ -62,15 +62,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut sensors = Sensors::ideal();
     sensors.rate = 1000.0;
     sensors.seed = 7;
-    sensors.angle = [Channel {
+    sensors.angle = [SensorChannel {
         range: TAU / 2.0,
         bits: Some(20),
-        ..Channel::white(5e-6)
+        ..SensorChannel::white(5e-6)
     }; 3];
-    sensors.force = [Channel {
+    sensors.force = [SensorChannel {
         range: 110.0,
         bits: Some(12),
-        ..Channel::white(0.1)
+        ..SensorChannel::white(0.1)
     }; 2];
     let read = sensors.read(&experiment, &recording)?;
     let mut bytes = Vec::new();

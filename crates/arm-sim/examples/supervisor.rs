@@ -4,13 +4,13 @@
 
 use arm_core::Shape;
 use arm_sim::{
-    Controller, Experiment, Fault, Safety, SimulationError, control, sample_experiments,
+    Controller, Experiment, InjectedFault, Safety, SimulationError, control, sample_experiments,
 };
 
 /// Movements of different reach and speed, of arms with two and three segments in turn.
 fn run(
     number: u64,
-    fault: Option<(f64, Fault)>,
+    fault: Option<(f64, InjectedFault)>,
 ) -> Result<(bool, Option<u64>, f64), SimulationError> {
     let share = |k: u64| ((number * 2_654_435_761 + k * 40_503) % 1000) as f64 / 1000.0;
     let duration = 2.0 + 6.0 * share(1);
@@ -51,15 +51,15 @@ fn main() -> Result<(), SimulationError> {
     }
     println!("{stopped} of {runs} clean runs were stopped");
     let faults = [
-        Fault::Runaway(0),
-        Fault::Runaway(1),
-        Fault::Frozen(0),
-        Fault::Frozen(1),
-        Fault::NotANumber(0),
-        Fault::NotANumber(1),
-        Fault::Late(1e-3),
-        Fault::Pressed([150.0, 0.0]),
-        Fault::Pressed([0.0, -150.0]),
+        InjectedFault::Runaway(0),
+        InjectedFault::Runaway(1),
+        InjectedFault::Frozen(0),
+        InjectedFault::Frozen(1),
+        InjectedFault::NotANumber(0),
+        InjectedFault::NotANumber(1),
+        InjectedFault::Late(1e-3),
+        InjectedFault::Pressed([150.0, 0.0]),
+        InjectedFault::Pressed([0.0, -150.0]),
     ];
     for fault in faults {
         let (mut seen, mut latest, mut force) = (0, 0, 0.0_f64);

@@ -30,10 +30,12 @@ pub use experiment::movement::{JointMotion, Movement};
 pub use experiment::piecewise_cubic::{Interpolation, Jet, Series, cubic_weights};
 pub use experiment::sample_experiments;
 pub use free_memory::{require_memory, reserve_memory};
-pub use laboratory::interaction_control::{Interaction, Law, Support, Yielded, interact};
-pub use laboratory::joint_controller::{Controlled, Controller, Fault, control};
+pub use laboratory::interaction_control::{
+    Interaction, InteractionLaw, Support, Yielded, interact,
+};
+pub use laboratory::joint_controller::{Controlled, Controller, InjectedFault, control};
 pub use laboratory::noise::Normal;
-pub use laboratory::sensors::{Channel, Readings, Sensors};
+pub use laboratory::sensors::{Readings, SensorChannel, Sensors};
 pub use laboratory::supervisor::Safety;
 pub use recording::digest::{Digest, definite, digest, digest_of};
 pub use recording::record::{EnergyColumns, Partial, Piece, Recording, TorqueColumns, WorkColumns};

@@ -6,7 +6,9 @@ use arm_core::estimator::{Estimator, Sample, Settings};
 use arm_core::{Chain, Elbow, Equation, Joints, Measured, Real, Robot, Segment};
 use arm_ident::inference::joint_method::{Options, identify};
 use arm_ident::regression::trial::{Model, Trial};
-use arm_sim::{Channel, Integrator, Sensors, digest, sample_experiments, simulate, simulate_batch};
+use arm_sim::{
+    Integrator, SensorChannel, Sensors, digest, sample_experiments, simulate, simulate_batch,
+};
 
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -28,8 +30,8 @@ fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
     let mut sensors = Sensors::ideal();
     sensors.rate = 500.0;
     sensors.seed = 3;
-    sensors.angle = [Channel::white(1e-3); 2];
-    sensors.force = [Channel::white(0.1); 2];
+    sensors.angle = [SensorChannel::white(1e-3); 2];
+    sensors.force = [SensorChannel::white(0.1); 2];
     let read = sensors.read(&experiment, &recording)?;
     let pairs = |v: &[f64]| -> Vec<[f64; 2]> { v.chunks_exact(2).map(|c| [c[0], c[1]]).collect() };
     let robot_q = pairs(&read.robot_q);

@@ -36,7 +36,7 @@ impl Quantity {
 /// What one channel must not do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Channel<T> {
+pub struct MonitoredChannel<T> {
     /// What it measures.
     pub quantity: Quantity,
     /// Smallest value allowed.
@@ -51,7 +51,7 @@ pub struct Channel<T> {
     pub frozen_after: Option<u64>,
 }
 
-impl<T: Real> Channel<T> {
+impl<T: Real> MonitoredChannel<T> {
     /// A channel with a range, never taken as frozen.
     pub fn range(quantity: Quantity, min: T, max: T) -> Self {
         let infinite = T::of(f64::INFINITY);
@@ -171,8 +171,8 @@ pub struct Times {
 /// the first period after the time allowed. The first stop is kept, whatever comes after it, until [`Monitor::reset`].
 ///
 /// ```
-/// use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason, Times};
-/// let channels = [Channel::range(Quantity::Angle, -1.5, 0.5).frozen_after(50_000)];
+/// use arm_core::monitor::{MonitoredChannel, Monitor, Observation, Quantity, Reason, Times};
+/// let channels = [MonitoredChannel::range(Quantity::Angle, -1.5, 0.5).frozen_after(50_000)];
 /// let mut monitor = Monitor::new(channels, Times { oldest: 2_000, period: 2_000 })?;
 /// let mut seen = Observation { now: 1_000, stamp: 1_000, values: [0.2], moving: [true] };
 /// assert!(monitor.check(&seen).is_ok());
@@ -183,7 +183,7 @@ pub struct Times {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor<T, const C: usize> {
-    channels: [Channel<T>; C],
+    channels: [MonitoredChannel<T>; C],
     times: Times,
     /// Sum over the words of the limits of each channel, and the channel that is next compared with it. A single bit that
     /// flips is seen for certain.
@@ -211,7 +211,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     /// # Errors
     /// [`Invalid`] for no channel, a limit that is NaN, a range that is empty, a change that is not positive, and times of zero.
     /// An infinite limit is none.
-    pub fn new(channels: [Channel<T>; C], times: Times) -> Result<Self, Invalid> {
+    pub fn new(channels: [MonitoredChannel<T>; C], times: Times) -> Result<Self, Invalid> {
         at_least_one("number of channels", C as u64)?;
         at_least_one("longest period", times.period)?;
         for (index, channel) in channels.iter().enumerate() {
@@ -412,7 +412,7 @@ impl<T: Real, const C: usize> Monitor<T, C> {
     }
 }
 
-impl<T: Real> Channel<T> {
+impl<T: Real> MonitoredChannel<T> {
     /// Whether a value is not allowed, or may not be. One that is not finite has moved by no finite amount.
     #[inline]
     fn refuses(&self, value: T, moved: T, passed: T) -> bool {
@@ -445,7 +445,7 @@ impl<T: Real> Channel<T> {
 }
 
 /// What must not change in memory: the limits of a channel, the times, and how many channels are watched.
-fn sum_of<T: Real>(channel: &Channel<T>, times: &Times, watched: usize) -> u32 {
+fn sum_of<T: Real>(channel: &MonitoredChannel<T>, times: &Times, watched: usize) -> u32 {
     let limits = [channel.min, channel.max, channel.fastest, channel.farthest];
     let sum = added(added(added(0, watched as u64), times.oldest), times.period);
     let sum = limits

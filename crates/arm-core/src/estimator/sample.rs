@@ -1,6 +1,6 @@
 //! What an estimator is given in one control period, and what became of it.
 
-use super::channel::Fault;
+use super::filtered_channel::Fault;
 use crate::Joints;
 use crate::numeric::scalar::Real;
 use crate::regression::Measured;

@@ -1,6 +1,6 @@
 //! How an estimator works, and what follows from it for one control period.
 
-use super::channel::Cutoff;
+use super::filtered_channel::Cutoff;
 use super::sample::Sample;
 use super::schedule::budget;
 use crate::check::{SMALLEST, at_least_zero, finite, ordered, positive};

@@ -17,7 +17,7 @@ use crate::{Controller, Experiment, JointMotion, Safety, SimulationError};
 
 /// How the handle responds to a force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Law {
+pub enum InteractionLaw {
     /// Motion in, force out.
     Impedance,
     /// Force in, motion out.
@@ -28,7 +28,7 @@ pub enum Law {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interaction {
     /// Which of the two.
-    pub law: Law,
+    pub law: InteractionLaw,
     /// Stiffness about the required position \[N/m\].
     pub stiffness: f64,
     /// Damping about the required velocity \[N s/m\].
@@ -42,7 +42,7 @@ pub struct Interaction {
 impl Default for Interaction {
     fn default() -> Self {
         Self {
-            law: Law::Impedance,
+            law: InteractionLaw::Impedance,
             stiffness: 300.0,
             damping: 150.0,
             mass: 8.0,
@@ -311,8 +311,8 @@ impl<'a, const N: usize> Loop<'a, N> {
         self.seen_qd += ((read - self.seen_q) / c.period - self.seen_qd) * share;
         self.seen_q = *read;
         let torque = match self.interaction.law {
-            Law::Impedance => self.impedance(wanted, pushed),
-            Law::Admittance => self.admittance(robot, wanted, (force_on_arm, pushed))?,
+            InteractionLaw::Impedance => self.impedance(wanted, pushed),
+            InteractionLaw::Admittance => self.admittance(robot, wanted, (force_on_arm, pushed))?,
         };
         let limited = torque.map(|t| t.clamp(-c.torque_limit, c.torque_limit));
         let load = Load {

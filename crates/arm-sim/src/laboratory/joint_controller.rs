@@ -49,7 +49,7 @@ impl Default for Controller {
 
 /// A fault that is injected.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
+pub enum InjectedFault {
     /// The motor of a joint gives all its torque, whatever the command.
     Runaway(usize),
     /// The encoder of a joint keeps its value.
@@ -100,7 +100,7 @@ const INTEGRAL_TIME: f64 = 10.0;
 pub fn control<const N: usize>(
     experiment: &Experiment<N>,
     (controller, safety): (&Controller, &Safety),
-    fault: Option<(f64, Fault)>,
+    fault: Option<(f64, InjectedFault)>,
     seed: u64,
 ) -> Result<Controlled, SimulationError> {
     check(controller, safety)?;
@@ -136,7 +136,7 @@ pub fn control<const N: usize>(
         let read = loop_.encoders(fault);
         if done.stop.is_none() {
             let behind = match fault {
-                Some(Fault::Late(delay)) => delay,
+                Some(InjectedFault::Late(delay)) => delay,
                 _ => 0.0,
             };
             done.stop = supervisor.look(k, &read, (wanted, pressed(force, fault)), behind);
@@ -218,9 +218,11 @@ pub(crate) fn check(controller: &Controller, safety: &Safety) -> Result<(), Simu
     Ok(())
 }
 
-fn pressed(force_on_arm: Plane<f64>, fault: Option<Fault>) -> Plane<f64> {
+fn pressed(force_on_arm: Plane<f64>, fault: Option<InjectedFault>) -> Plane<f64> {
     match fault {
-        Some(Fault::Pressed(more)) => [force_on_arm[0] - more[0], force_on_arm[1] - more[1]],
+        Some(InjectedFault::Pressed(more)) => {
+            [force_on_arm[0] - more[0], force_on_arm[1] - more[1]]
+        }
         _ => force_on_arm,
     }
 }
@@ -258,16 +260,16 @@ impl<'a, const N: usize> Loop<'a, N> {
         })
     }
 
-    fn encoders(&mut self, fault: Option<Fault>) -> Joints<f64, 2> {
+    fn encoders(&mut self, fault: Option<InjectedFault>) -> Joints<f64, 2> {
         let step = encoder_step(self.controller.encoder_bits);
         let mut read = self.body.q.map(|q| (q / step).round() * step);
         self.pressed = [0.0; 2];
         match fault {
-            Some(Fault::Frozen(joint)) => {
+            Some(InjectedFault::Frozen(joint)) => {
                 read[joint] = *self.frozen.get_or_insert(self.seen_q[joint]);
             }
-            Some(Fault::NotANumber(joint)) => read[joint] = f64::NAN,
-            Some(Fault::Pressed(force)) => self.pressed = force,
+            Some(InjectedFault::NotANumber(joint)) => read[joint] = f64::NAN,
+            Some(InjectedFault::Pressed(force)) => self.pressed = force,
             _ => {}
         }
         read
@@ -278,7 +280,7 @@ impl<'a, const N: usize> Loop<'a, N> {
         &mut self,
         read: &Joints<f64, 2>,
         wanted: &JointMotion<2>,
-        fault: Option<Fault>,
+        fault: Option<InjectedFault>,
     ) -> Joints<f64, 2> {
         let c = self.controller;
         let contact = self.body.contact_torque(self.pressed);
@@ -298,7 +300,7 @@ impl<'a, const N: usize> Loop<'a, N> {
                 + viscosity * (wanted.qd[i] - self.seen_qd[i])
                 + self.integral[i];
             let given = match fault {
-                Some(Fault::Runaway(joint)) if joint == i => c.torque_limit,
+                Some(InjectedFault::Runaway(joint)) if joint == i => c.torque_limit,
                 // A driver ignores a command that is not a number.
                 _ if torque.is_nan() => 0.0,
                 _ => torque.clamp(-c.torque_limit, c.torque_limit),

@@ -7,7 +7,7 @@ use crate::{Experiment, Recording, SimulationError, cubic_weights};
 
 /// One channel of a sensor: noise, then quantisation, then saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Channel {
+pub struct SensorChannel {
     /// Standard deviation of the noise, in the unit of the channel; zero for none.
     pub deviation: f64,
     /// Time in which the correlation of the noise falls to 1/e \[s\]; zero for white noise.
@@ -18,7 +18,7 @@ pub struct Channel {
     pub bits: Option<u32>,
 }
 
-impl Channel {
+impl SensorChannel {
     /// A channel that reads the true value.
     pub const IDEAL: Self = Self {
         deviation: 0.0,
@@ -85,15 +85,15 @@ pub struct Sensors<const N: usize> {
     /// Number from which all noise follows.
     pub seed: u64,
     /// Joint angles of the arm \[rad\].
-    pub angle: [Channel; N],
+    pub angle: [SensorChannel; N],
     /// Force on the arm, y and z \[N\].
-    pub force: [Channel; 2],
+    pub force: [SensorChannel; 2],
     /// Moment on the arm \[N m\].
-    pub moment: Channel,
+    pub moment: SensorChannel,
     /// Joint angles of the robot \[rad\].
-    pub robot: [Channel; 2],
+    pub robot: [SensorChannel; 2],
     /// Torques of motors in the joints \[N m\].
-    pub torque: [Channel; N],
+    pub torque: [SensorChannel; N],
 }
 
 impl<const N: usize> Sensors<N> {
@@ -102,16 +102,16 @@ impl<const N: usize> Sensors<N> {
         Self {
             rate: 50.0,
             seed: 0,
-            angle: [Channel::IDEAL; N],
-            force: [Channel::IDEAL; 2],
-            moment: Channel::IDEAL,
-            robot: [Channel::IDEAL; 2],
-            torque: [Channel::IDEAL; N],
+            angle: [SensorChannel::IDEAL; N],
+            force: [SensorChannel::IDEAL; 2],
+            moment: SensorChannel::IDEAL,
+            robot: [SensorChannel::IDEAL; 2],
+            torque: [SensorChannel::IDEAL; N],
         }
     }
 
     /// Channels in the order of their random streams: a channel that is added later leaves the noise of the others as it is.
-    fn channels(&self) -> impl Iterator<Item = (u64, &Channel)> {
+    fn channels(&self) -> impl Iterator<Item = (u64, &SensorChannel)> {
         let group = |first: u64, channels| std::iter::zip(first.., channels);
         group(0, self.force.as_slice())
             .chain(group(2, std::slice::from_ref(&self.moment)))

@@ -1,6 +1,6 @@
 //! The safety supervisor that watches a robot (thesis section 3.3).
 
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Stop, Times};
+use arm_core::monitor::{Monitor, MonitoredChannel, Observation, Quantity, Stop, Times};
 use arm_core::{Joints, Plane};
 
 use crate::laboratory::noise::Normal;
@@ -67,12 +67,12 @@ impl Supervisor {
                 });
             let margin = safety.angle_margin;
             // One sample may stay the same by chance, two do not.
-            Channel::range(Quantity::Angle, range[0] - margin, range[1] + margin)
+            MonitoredChannel::range(Quantity::Angle, range[0] - margin, range[1] + margin)
                 .frozen_after(interval + interval / 2)
         };
-        let speed = Channel::magnitude(Quantity::Speed, safety.speed);
-        let acceleration = Channel::magnitude(Quantity::Acceleration, safety.acceleration);
-        let force = Channel::magnitude(Quantity::Force, safety.force);
+        let speed = MonitoredChannel::magnitude(Quantity::Speed, safety.speed);
+        let acceleration = MonitoredChannel::magnitude(Quantity::Acceleration, safety.acceleration);
+        let force = MonitoredChannel::magnitude(Quantity::Force, safety.force);
         let channels = [
             angle(0),
             angle(1),

@@ -2,8 +2,8 @@
 
 use arm_core::{Joints, Pose, Shape, gravity, sample_arms::mechanical_arm};
 use arm_sim::{
-    Controller, Experiment, Interaction, Law, Safety, SimulationError, Support, Yielded, interact,
-    sample_experiments,
+    Controller, Experiment, Interaction, InteractionLaw, Safety, SimulationError, Support, Yielded,
+    interact, sample_experiments,
 };
 
 const SAFETY: Safety = Safety {
@@ -38,7 +38,7 @@ fn weight(q: &Joints<f64, 2>) -> Joints<f64, 2> {
     gravity(&mechanical_arm(), &Pose::new(q)) + q * sample_experiments::ELASTICITY
 }
 
-fn law(law: Law) -> Interaction {
+fn law(law: InteractionLaw) -> Interaction {
     Interaction {
         law,
         ..Interaction::default()
@@ -58,7 +58,7 @@ fn rms(done: &Yielded) -> f64 {
 
 #[test]
 fn the_handle_rests_where_its_spring_holds_the_arm() {
-    for of in [Law::Impedance, Law::Admittance] {
+    for of in [InteractionLaw::Impedance, InteractionLaw::Admittance] {
         let interaction = law(of);
         let done = run(&interaction, &[], None).expect("a run");
         assert_eq!(done.stop, None, "{of:?}");
@@ -82,7 +82,7 @@ fn the_handle_rests_where_its_spring_holds_the_arm() {
 
 #[test]
 fn an_arm_that_is_carried_needs_no_force() {
-    for of in [Law::Impedance, Law::Admittance] {
+    for of in [InteractionLaw::Impedance, InteractionLaw::Admittance] {
         let without = rms(&run(&law(of), &[], None).expect("a run"));
         let mut carry = |_: f64, q: &Joints<f64, 2>| Some(weight(q));
         let with = run(&law(of), &[], Some(&mut carry)).expect("a run");
@@ -101,8 +101,8 @@ fn an_arm_that_is_carried_needs_no_force() {
 #[test]
 fn a_torque_that_is_not_trusted_is_none() {
     let mut carry = |_: f64, _: &Joints<f64, 2>| None;
-    let with = run(&law(Law::Impedance), &[], Some(&mut carry)).expect("a run");
-    let without = run(&law(Law::Impedance), &[], None).expect("a run");
+    let with = run(&law(InteractionLaw::Impedance), &[], Some(&mut carry)).expect("a run");
+    let without = run(&law(InteractionLaw::Impedance), &[], None).expect("a run");
     assert_eq!(with, without);
 }
 
@@ -110,14 +110,14 @@ fn a_torque_that_is_not_trusted_is_none() {
 #[test]
 fn a_loop_that_is_not_stable_is_stopped() {
     let mut carry = |_: f64, q: &Joints<f64, 2>| Some(weight(q) * 5.0);
-    let done = run(&law(Law::Impedance), &[], Some(&mut carry)).expect("a run");
+    let done = run(&law(InteractionLaw::Impedance), &[], Some(&mut carry)).expect("a run");
     assert!(done.stop.is_some());
     assert_eq!(last(&done.support), [0.0; 2]);
 }
 
 #[test]
 fn a_perturbation_moves_the_handle_again_and_again() {
-    let interaction = law(Law::Impedance);
+    let interaction = law(InteractionLaw::Impedance);
     let quiet = run(&interaction, &[], None).expect("a run");
     // Half a second up, half a second down.
     let push: Vec<f64> = (0..4000)

@@ -3,7 +3,8 @@
 use arm_core::Shape;
 use arm_core::monitor::Reason;
 use arm_sim::{
-    Controlled, Controller, Experiment, Fault, Safety, SimulationError, control, sample_experiments,
+    Controlled, Controller, Experiment, InjectedFault, Safety, SimulationError, control,
+    sample_experiments,
 };
 
 /// Control periods within which a fault must be seen.
@@ -19,7 +20,7 @@ fn experiment(duration: f64) -> Experiment<2> {
     experiment
 }
 
-fn run(duration: f64, fault: Option<(f64, Fault)>, seed: u64) -> Controlled {
+fn run(duration: f64, fault: Option<(f64, InjectedFault)>, seed: u64) -> Controlled {
     let settings = (&Controller::default(), &Safety::default());
     control(&experiment(duration), settings, fault, seed).expect("a run")
 }
@@ -61,15 +62,15 @@ fn never_stops_without_a_fault() {
 #[test]
 fn every_fault_stops_the_robot_within_two_periods() {
     let faults = [
-        (Fault::Runaway(0), Reason::Limit),
-        (Fault::Runaway(1), Reason::Limit),
-        (Fault::Frozen(0), Reason::Frozen),
-        (Fault::Frozen(1), Reason::Frozen),
-        (Fault::NotANumber(0), Reason::NotFinite),
-        (Fault::NotANumber(1), Reason::NotFinite),
-        (Fault::Late(1e-3), Reason::Clock),
-        (Fault::Pressed([150.0, 0.0]), Reason::Limit),
-        (Fault::Pressed([0.0, -150.0]), Reason::Limit),
+        (InjectedFault::Runaway(0), Reason::Limit),
+        (InjectedFault::Runaway(1), Reason::Limit),
+        (InjectedFault::Frozen(0), Reason::Frozen),
+        (InjectedFault::Frozen(1), Reason::Frozen),
+        (InjectedFault::NotANumber(0), Reason::NotFinite),
+        (InjectedFault::NotANumber(1), Reason::NotFinite),
+        (InjectedFault::Late(1e-3), Reason::Clock),
+        (InjectedFault::Pressed([150.0, 0.0]), Reason::Limit),
+        (InjectedFault::Pressed([0.0, -150.0]), Reason::Limit),
     ];
     for seed in 0..10 {
         // In the middle of either half, where both joints move.
@@ -78,7 +79,7 @@ fn every_fault_stops_the_robot_within_two_periods() {
             let done = run(4.0, Some((at, fault)), seed);
             let stop = done.stop.expect("a stop");
             // An encoder that freezes in fast motion reads as an impossible deceleration at once.
-            let braked = matches!(fault, Fault::Frozen(_)) && stop.reason == Reason::Limit;
+            let braked = matches!(fault, InjectedFault::Frozen(_)) && stop.reason == Reason::Limit;
             assert!(stop.reason == reason || braked, "{fault:?}: {stop:?}");
             let periods = done.periods_to_stop.expect("a stop after the fault");
             assert!(periods <= SOON, "{fault:?}: {periods} periods");
@@ -91,7 +92,7 @@ fn a_stop_does_no_harm() {
     let rest = run(4.0, None, 1).force_after_fault;
     assert_eq!(rest, 0.0);
     for joint in 0..2 {
-        let done = run(4.0, Some((1.0, Fault::Runaway(joint))), 1);
+        let done = run(4.0, Some((1.0, InjectedFault::Runaway(joint))), 1);
         assert!(done.way_after_stop < 0.01, "{} m", done.way_after_stop);
         assert!(
             done.force_after_fault < 60.0,

@@ -1,7 +1,7 @@
 //! What the sensors read.
 
 use arm_core::effect::{Effect, Kind};
-use arm_sim::{Channel, Experiment, Readings, Recording, Sensors, sample_experiments};
+use arm_sim::{Experiment, Readings, Recording, SensorChannel, Sensors, sample_experiments};
 
 use crate::common::{largest, run, smooth};
 
@@ -109,10 +109,10 @@ fn distortions_come_in_the_order_of_the_list_before_quantisation() {
         Effect::new(Kind::AngleOffset, 1).with(&[0.25]),
     ]);
     let mut sensors = Sensors::ideal();
-    sensors.force[0] = Channel {
+    sensors.force[0] = SensorChannel {
         range: 50.0,
         bits: Some(10),
-        ..Channel::IDEAL
+        ..SensorChannel::IDEAL
     };
     let read = sensors.read(&experiment, &r).expect("readings");
     let step = 100.0 / 1024.0;
@@ -130,10 +130,10 @@ fn saturation_and_quantisation_of_zero() {
     recording.q[0] = 3.0;
     recording.q[1] = -3.0;
     let mut sensors = Sensors::ideal();
-    sensors.angle[0] = Channel {
+    sensors.angle[0] = SensorChannel {
         range: 1.0,
         bits: Some(3),
-        ..Channel::IDEAL
+        ..SensorChannel::IDEAL
     };
     let q = read(&sensors, &recording).q;
     assert_eq!(q[..3], [1.0, -1.0, 0.0]);
@@ -144,11 +144,11 @@ fn noise_has_its_deviation_and_colour() {
     let recording = silent(2000);
     let mut sensors = Sensors::ideal();
     sensors.force = [
-        Channel::white(0.2),
-        Channel {
+        SensorChannel::white(0.2),
+        SensorChannel {
             deviation: 0.2,
             correlation_time: 0.1,
-            ..Channel::IDEAL
+            ..SensorChannel::IDEAL
         },
     ];
     let readings = read(&sensors, &recording);
@@ -178,10 +178,10 @@ fn noise_has_its_deviation_and_colour() {
 fn noise_follows_from_the_seed_and_channels_are_independent() {
     let recording = silent(10);
     let mut sensors = Sensors::ideal();
-    sensors.angle[0] = Channel::white(1.0);
+    sensors.angle[0] = SensorChannel::white(1.0);
     let first = read(&sensors, &recording);
     assert_eq!(first, read(&sensors, &recording));
-    sensors.force[1] = Channel::white(1.0);
+    sensors.force[1] = SensorChannel::white(1.0);
     let both = read(&sensors, &recording);
     assert_eq!(first.q, both.q);
     let correlation: f64 = (0..both.time.len())

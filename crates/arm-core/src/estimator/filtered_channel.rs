@@ -98,7 +98,7 @@ impl<T: Real> LowPass<T> {
 /// The rates are those of the first low-pass and pass the second as they are. Taken from the second they would be the same
 /// but for rounding: a difference of nearly equal angles, whose last bits the pace of the filter, squared, makes large.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Channel<T> {
+pub(super) struct FilteredChannel<T> {
     /// Last value that came, good or not.
     raw: T,
     /// Last value that was used, measured or bridged.
@@ -116,7 +116,7 @@ pub(super) struct Channel<T> {
     of_rate: LowPass<T>,
 }
 
-impl<T: Real> Channel<T> {
+impl<T: Real> FilteredChannel<T> {
     pub fn new() -> Self {
         Self {
             raw: T::ZERO,
@@ -217,7 +217,7 @@ impl<T: Real> Channel<T> {
         self.of_value.step(first.value, cutoff).value
     }
 
-    /// The first and the second rate of [`Channel::value`].
+    /// The first and the second rate of [`FilteredChannel::value`].
     #[inline]
     pub fn rates(&mut self, first: &Smooth<T>, cutoff: &Cutoff<T>) -> [T; 2] {
         if !self.alive {
@@ -232,7 +232,7 @@ impl<T: Real> Channel<T> {
 // Once in the code for all kinds of channels, as what follows.
 #[inline(never)]
 pub(super) fn restart<T: Real, const K: usize>(
-    channels: &mut [Channel<T>; K],
+    channels: &mut [FilteredChannel<T>; K],
     values: &[T; K],
 ) -> bool {
     let pairs = channels.iter_mut().zip(values);
@@ -244,7 +244,7 @@ pub(super) fn restart<T: Real, const K: usize>(
 /// The values of channels behind the second low-pass.
 #[inline(never)]
 pub(super) fn values<T: Real, const K: usize>(
-    channels: &mut [Channel<T>; K],
+    channels: &mut [FilteredChannel<T>; K],
     first: &[Smooth<T>; K],
     cutoff: &Cutoff<T>,
 ) -> [T; K] {
@@ -253,7 +253,7 @@ pub(super) fn values<T: Real, const K: usize>(
 
 /// What is wrong with the values of one period.
 pub(super) struct Checks {
-    /// See [`Channel::fault`].
+    /// See [`FilteredChannel::fault`].
     pub frozen_after: Option<u32>,
     /// The first fault.
     pub fault: Option<Fault>,
@@ -266,7 +266,7 @@ impl Checks {
     #[inline(never)]
     pub fn passed<T: Real, const K: usize>(
         &mut self,
-        channels: &mut [Channel<T>; K],
+        channels: &mut [FilteredChannel<T>; K],
         values: Option<&[T; K]>,
         farthest: T,
         cutoff: &Cutoff<T>,
@@ -277,7 +277,7 @@ impl Checks {
     #[inline]
     fn passed_one<T: Real>(
         &mut self,
-        channel: &mut Channel<T>,
+        channel: &mut FilteredChannel<T>,
         value: Option<T>,
         farthest: T,
         cutoff: &Cutoff<T>,
