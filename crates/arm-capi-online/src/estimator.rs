@@ -55,8 +55,8 @@ pub enum armrs_sample_status {
 }
 
 impl From<SampleStatus> for armrs_sample_status {
-    fn from(heed: SampleStatus) -> Self {
-        match heed {
+    fn from(sample_status: SampleStatus) -> Self {
+        match sample_status {
             SampleStatus::Taken => Self::ARMRS_TAKEN,
             SampleStatus::Resting => Self::ARMRS_RESTING,
             SampleStatus::Settling => Self::ARMRS_SETTLING,
@@ -129,7 +129,7 @@ type Core = Estimator<armrs_real, ARMRS_JOINTS, ARMRS_UNKNOWNS, ARMRS_EFFECTS>;
 
 held!(armrs_estimator holds Core, b"estim0.1");
 
-/// One control period; `sample` is null where one is missing. `heed`, if not null, says what became of it.
+/// One control period; `sample` is null where one is missing. `sample_status`, if not null, says what became of it.
 ///
 /// # Safety
 /// The pointers are null or point to what is said.
@@ -137,12 +137,12 @@ held!(armrs_estimator holds Core, b"estim0.1");
 pub unsafe extern "C" fn armrs_estimator_update(
     estimator: *mut armrs_estimator,
     sample: *const armrs_sample,
-    heed: *mut armrs_sample_status,
+    sample_status: *mut armrs_sample_status,
 ) -> armrs_status {
     let run = || {
         // SAFETY: as promised by the caller.
-        let (estimator, sample, heed) =
-            unsafe { (place(estimator)?, sample.as_ref(), heed.as_mut()) };
+        let (estimator, sample, sample_status) =
+            unsafe { (place(estimator)?, sample.as_ref(), sample_status.as_mut()) };
         let sample = sample.map(|s| Sample {
             q: joints(&s.q),
             lead: (s.led != 0).then(|| joints(&s.lead)),
@@ -153,8 +153,8 @@ pub unsafe extern "C" fn armrs_estimator_update(
             },
         });
         let found = estimator.inner_mut()?.update(sample.as_ref());
-        if let Some(heed) = heed {
-            *heed = found.into();
+        if let Some(sample_status) = sample_status {
+            *sample_status = found.into();
         }
         Ok(())
     };

@@ -88,7 +88,7 @@ impl<'a, 'py> Call<'a, 'py> {
         self.trials.iter().map(file).collect()
     }
 
-    fn asked<'s>(&'s self, trials: &'s [TrialFile]) -> SearchInput<'s> {
+    fn input<'s>(&'s self, trials: &'s [TrialFile]) -> SearchInput<'s> {
         SearchInput {
             model: self.settings.model.get().inner(),
             force_on_robot: self.settings.force_on_robot,
@@ -139,13 +139,13 @@ pub fn play(
         let one = |i: usize| {
             let course = Arc::new(session.course(i)?);
             // A trial that cannot be simulated is reported below.
-            let believed = match own {
+            let own_or_given = match own {
                 true => session.in_trial((&given, &[]), &course).ok(),
                 false => None,
             };
             let mut trial = core::SimulatedTrial::measured(&session, (i, files[i]), &course);
-            let believed = believed.as_ref().unwrap_or(&given);
-            trial.shown[Version::Given as usize] = session.shown_in(believed, &course).ok();
+            let hypothesis = own_or_given.as_ref().unwrap_or(&given);
+            trial.shown[Version::Given as usize] = session.shown_in(hypothesis, &course).ok();
             Ok(trial)
         };
         let threads = call.settings.threads;
@@ -192,8 +192,8 @@ pub fn find_gap(
         let done = call.studied(py, &session, |s| s.search(&|w, s| callback.tell(w, s)));
         let (prepared, finding) = callback.or_raised(done)?;
         let files = call.files();
-        let asked = call.asked(&files);
-        py.detach(|| core::GapResult::of(&prepared, &finding, &asked))
+        let input = call.input(&files);
+        py.detach(|| core::GapResult::of(&prepared, &finding, &input))
             .map(GapResult)
             .map_err(refused)
     }
@@ -222,8 +222,8 @@ pub fn look(
         let done = call.studied(py, &session, |s| s.look(&|w, s| callback.tell(w, s)));
         let (prepared, look) = callback.or_raised(done)?;
         let files = call.files();
-        let asked = call.asked(&files);
-        py.detach(|| core::Screening::of(&prepared, &look, &asked))
+        let input = call.input(&files);
+        py.detach(|| core::Screening::of(&prepared, &look, &input))
             .map(Screening)
             .map_err(refused)
     }

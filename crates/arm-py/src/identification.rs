@@ -99,8 +99,8 @@ fn trial<const N: usize>(c: &Columns<'_>, configuration: usize, rig: &Rig) -> Py
     };
     let base = c.base.as_ref().map(|b| rows::<2>("base", b)).transpose()?;
     // Where no effect depends on it, the arm moves without it.
-    let felt = rig.effects.iter().any(|e| e.kind.feels_activity());
-    let activity = c.activity.as_ref().filter(|_| felt);
+    let feels_activity = rig.effects.iter().any(|e| e.kind.feels_activity());
+    let activity = c.activity.as_ref().filter(|_| feels_activity);
     let activity = activity.map(|a| rows("activity", a)).transpose()?;
     let trial = Trial {
         role: if c.role == "test" {
@@ -233,14 +233,14 @@ pub fn identify(
             role: trial.role,
             configuration: c.configuration.clone(),
         });
-        let asked = IdentificationInput {
+        let input = IdentificationInput {
             model: settings.model.get().inner(),
             effects: &rig.effects,
             trials: &names.collect::<Vec<_>>(),
             method: &settings.method,
             level: settings.level,
         };
-        core::Identification::of(&result, &asked)
+        core::Identification::of(&result, &input)
             .map(Identification)
             .map_err(refused)
     }

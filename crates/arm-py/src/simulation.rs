@@ -256,8 +256,12 @@ pub fn experiment<const N: usize>(
     settings: &Settings,
 ) -> PyResult<Experiment<N>> {
     let base = base_path(drive)?;
-    let felt = rig.effects.iter().any(|e| e.kind.feels_activity());
-    let activity = if felt { activity::<N>(drive)? } else { None };
+    let feels_activity = rig.effects.iter().any(|e| e.kind.feels_activity());
+    let activity = if feels_activity {
+        activity::<N>(drive)?
+    } else {
+        None
+    };
     let (drive, first, natural) = driven(chain, rig, drive)?;
     // A whole number of recorded samples: not beyond the last sample of a drive, and up to the end of a movement.
     let whole = |d: f64| {

@@ -118,11 +118,11 @@ pub enum SimulationError {
     },
     /// An accuracy that no admissible step reaches.
     #[error(
-        "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {asked:e} rad; steps shorter than 1e-6 s are not tried"
+        "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {requested:e} rad; steps shorter than 1e-6 s are not tried"
     )]
     Accuracy {
         /// Requested accuracy \[rad\].
-        asked: f64,
+        requested: f64,
         /// Estimated error at the shortest step \[rad\].
         reached: f64,
         /// That step \[s\].

@@ -227,7 +227,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
         let fault = match sensed {
             Ok(()) => return self.learn(due),
-            Err(heed) => heed,
+            Err(status) => status,
         };
         if fault == SampleStatus::Refused(Fault::Frozen) {
             // Samples since it froze are discarded too.
@@ -360,7 +360,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     /// At rest it is added as well, for to leave out slow samples would favour one side of every reversal; what counts is
     /// whether the arm moved at any time in the window.
     fn learn(&mut self, due: bool) -> SampleStatus {
-        let heed = if due {
+        let status = if due {
             self.since_row = 0;
             self.weigh()
         } else {
@@ -368,7 +368,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         };
         self.windows.open().moved |= self.moving;
         self.age();
-        match heed {
+        match status {
             SampleStatus::Taken if !self.moving => SampleStatus::Resting,
             other => other,
         }

@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_that_failed_once_is_asked_again() {
+    fn a_law_that_failed_once_is_evaluated_again() {
         let good = law().tabulate;
         let first = std::sync::atomic::AtomicBool::new(true);
         let once = move |p: &[f64]| {
@@ -274,14 +274,14 @@ mod tests {
     }
 
     #[test]
-    fn a_law_may_ask_for_another_one() {
+    fn a_law_may_evaluate_another_one() {
         let inner: &'static Tabulated = Box::leak(Box::new(law()));
         let good = law().tabulate;
-        let asks = move |p: &[f64]| {
+        let nested = move |p: &[f64]| {
             let torque = inner.torque(&[1.0, 0.0, 0.2, 0.0, 0.0, 0.0], &Local::moving(0.0, 0.0));
             good(p).filter(|_| torque == 0.0)
         };
-        let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(asks));
+        let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(nested));
         let p = [1.0, 0.0, 0.5, 0.0, 0.0, 0.0];
         assert!((law.torque(&p, &Local::moving(1.0, 0.0)) - libm::sin(2.0)).abs() < 1e-6);
     }

@@ -33,7 +33,7 @@ impl<const N: usize> Session<N> {
         let mut channels = vec![Vec::with_capacity(course.times.len()); N];
         for (i, &time) in course.times.iter().enumerate() {
             let (q, qd, qdd) = true_motion(hypothesis, motion, i);
-            let chain = motion.felt(&arm, i);
+            let chain = motion.chain_in_moving_frame(&arm, i);
             let q = q - offset;
             let pose = Pose::new(&q);
             let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);
@@ -174,12 +174,12 @@ mod tests {
             let mut hypothesis = session.given();
             hypothesis.named = faults.to_vec();
             hypothesis.placement = placement;
-            let told = session.torques(&hypothesis, &course).expect("torques");
+            let computed = session.torques(&hypothesis, &course).expect("torques");
             // Away from the ends, where the motion is filtered.
             let apart = |j: usize| (100..500).map(move |i| (i, j)).collect::<Vec<_>>();
             let each = (0..2)
                 .flat_map(apart)
-                .map(|(i, j)| (told[j][i] - course.raw[j][i]).abs());
+                .map(|(i, j)| (computed[j][i] - course.raw[j][i]).abs());
             each.fold(0.0, f64::max)
         };
         assert!(left(&faults, place) < 2e-3, "{}", left(&faults, place));

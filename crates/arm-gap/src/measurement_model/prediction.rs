@@ -1,4 +1,4 @@
-//! What the channels would read if a hypothesis were true.
+//! Predicted readings of the channels along a trial under a hypothesis.
 
 use arm_core::effect::{Effect, Motion, Place, resisting_besides_dry};
 use arm_core::{Joints, Plane, Pose, inverse_dynamics, joint_force, static_torque};

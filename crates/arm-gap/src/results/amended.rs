@@ -1,3 +1,5 @@
+//! The model with the fitted changes.
+
 use arm_model::{Contact, Effect, Joint, Model, Refused, Robot, Segment};
 use serde::Serialize;
 

@@ -1,3 +1,5 @@
+//! The named effects, their alternatives, and movements that distinguish these.
+
 use arm_core::effect::{Effect as CoreEffect, Kind, Place as ActsOn};
 use arm_model::Effect;
 use serde::Serialize;
@@ -144,11 +146,11 @@ impl Missing {
     pub(super) fn named<const N: usize>(
         named: &model_selection::NamedEffect,
         finding: &Finding<N>,
-        asked: &SearchInput<'_>,
+        input: &SearchInput<'_>,
     ) -> Self {
         let effect = &finding.amended.hypothesis.named[named.slot];
         let info = effect.kind.info();
-        let own = sign_in_files(effect.kind, asked.force_on_robot);
+        let own = sign_in_files(effect.kind, input.force_on_robot);
         let precision = &finding.precision;
         let std = |p: usize| {
             let is_it = |c: Target| c == Target::Named(named.slot, p);
@@ -186,7 +188,7 @@ impl Missing {
     pub(super) fn trial_specific<const N: usize>(
         one: &TrialSpecific,
         finding: &Finding<N>,
-        asked: &SearchInput<'_>,
+        input: &SearchInput<'_>,
     ) -> Self {
         /// Parameters of time and speed, not of size.
         const SHAPES: [&str; 4] = ["frequency", "phase", "start", "duration"];
@@ -206,7 +208,7 @@ impl Missing {
                 (p.name.to_owned(), value)
             })
             .collect();
-        let trial = one.trial.map(|t| &asked.trials[t]);
+        let trial = one.trial.map(|t| &input.trials[t]);
         let (start, end) = one.span();
         if trial.is_some() {
             let start = || Value::of(start, None, "s", (0.0, 0.0));

@@ -181,8 +181,9 @@ impl OnlineEstimator {
     /// Values and standard deviations of the unknowns in use, and what each rests on.
     fn estimates(&self) -> Vec<(f64, f64, &'static str)> {
         let all = locked(&self.inner).estimates();
-        let told = all.into_iter();
-        told.map(|(value, sd, decided)| (value, sd, decided.name()))
+        let estimates = all.into_iter();
+        estimates
+            .map(|(value, sd, decided)| (value, sd, decided.name()))
             .collect()
     }
 
@@ -237,17 +238,17 @@ impl Recorded {
         status: Vec<u8>,
         [joints, used]: [usize; 2],
     ) -> PyResult<Bound<'_, PyDict>> {
-        let told = PyDict::new(py);
-        told.set_item("status", status.into_pyarray(py))?;
-        told.set_item("value", table(py, self.value, used)?)?;
-        told.set_item("sd", table(py, self.sd, used)?)?;
-        told.set_item("decided", table(py, self.decided, used)?)?;
-        told.set_item("torque", table(py, self.torque, joints)?)?;
-        told.set_item("torque_sd", table(py, self.torque_sd, joints)?)?;
-        told.set_item("residual", table(py, self.residual, joints)?)?;
-        told.set_item("excess", self.excess.into_pyarray(py))?;
-        told.set_item("age", self.age.into_pyarray(py))?;
-        told.set_item("restarts", self.restarts.into_pyarray(py))?;
-        Ok(told)
+        let columns = PyDict::new(py);
+        columns.set_item("status", status.into_pyarray(py))?;
+        columns.set_item("value", table(py, self.value, used)?)?;
+        columns.set_item("sd", table(py, self.sd, used)?)?;
+        columns.set_item("decided", table(py, self.decided, used)?)?;
+        columns.set_item("torque", table(py, self.torque, joints)?)?;
+        columns.set_item("torque_sd", table(py, self.torque_sd, joints)?)?;
+        columns.set_item("residual", table(py, self.residual, joints)?)?;
+        columns.set_item("excess", self.excess.into_pyarray(py))?;
+        columns.set_item("age", self.age.into_pyarray(py))?;
+        columns.set_item("restarts", self.restarts.into_pyarray(py))?;
+        Ok(columns)
     }
 }

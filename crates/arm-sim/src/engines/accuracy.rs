@@ -109,14 +109,14 @@ pub fn resolve<const N: usize>(
     let mut search = Search::new(experiment, accuracy)?;
     search.columns = Columns::Motion;
     loop {
-        let (mut q, mut qd, mut asked) = (Vec::new(), Vec::new(), ControlFlow::Continue(()));
+        let (mut q, mut qd, mut flow) = (Vec::new(), Vec::new(), ControlFlow::Continue(()));
         let run = simulate_in_pieces(Engine::Native, &search.experiment, PIECE, &mut |piece| {
             q.extend_from_slice(&piece.recording.q);
             qd.extend_from_slice(&piece.recording.qd);
-            asked = go_on();
-            asked
+            flow = go_on();
+            flow
         });
-        if asked.is_break() {
+        if flow.is_break() {
             return Ok(None);
         }
         let resolved = search.judge(run.as_ref().map(|()| [&q[..], &qd[..]]))?;
@@ -230,11 +230,11 @@ impl<const N: usize> Search<N> {
         let finer = match error {
             Some(error) if error <= self.accuracy => return Ok(Some(Resolved { dt, error })),
             Some(error) => {
-                let foretold = libm::pow(error / (AIM * self.accuracy), 1.0 / ORDER);
-                let finer = foretold.max(FINER.0).min(FINER.1);
+                let predicted = libm::pow(error / (AIM * self.accuracy), 1.0 / ORDER);
+                let finer = predicted.max(FINER.0).min(FINER.1);
                 if dt / finer < SHORTEST {
                     return Err(SimulationError::Accuracy {
-                        asked: self.accuracy,
+                        requested: self.accuracy,
                         reached: error,
                         dt,
                     });

@@ -30,7 +30,7 @@ impl Discontinuities {
     /// On the grid they matter only where a value jumps that acts on the arm directly: the acceleration of a handle that holds it
     /// rigidly, or a torque.
     pub fn of<const N: usize>(experiment: &Experiment<N>, schedule: &Schedule) -> Self {
-        let (times, felt) = match &experiment.drive {
+        let (times, acts_directly) = match &experiment.drive {
             Drive::Handle { path, coupling } => (path.breaks(), *coupling == Coupling::Rigid),
             Drive::Torque(Some(series)) => (series.times().to_vec(), true),
             Drive::Torque(None) => (Vec::new(), false),
@@ -50,7 +50,7 @@ impl Discontinuities {
             }
             if (steps - nearest).abs() > ON_GRID {
                 touch(steps.ceil().max(0.0) as usize, time);
-            } else if felt {
+            } else if acts_directly {
                 touch(nearest as usize, f64::INFINITY);
                 touch(nearest as usize + 1, f64::INFINITY);
             }

@@ -119,10 +119,13 @@ fn a_run_has_the_same_bits_alone_and_beside_others() {
 fn what_cannot_be_reached_is_refused() {
     let experiment = sampled(sample_experiments::human_experiment(0.1, [0.0; 3]).expect("valid"));
     let refused = step_of(&experiment, 1e-18).expect_err("beyond rounding");
-    let SimulationError::Accuracy { asked, reached, .. } = refused else {
+    let SimulationError::Accuracy {
+        requested, reached, ..
+    } = refused
+    else {
         panic!("{refused}");
     };
-    assert!(asked < reached && reached < 1e-9, "{refused}");
+    assert!(requested < reached && reached < 1e-9, "{refused}");
     for accuracy in [0.0, -1.0, f64::NAN] {
         assert!(matches!(
             step_of(&experiment, accuracy),
@@ -146,12 +149,12 @@ fn what_cannot_be_reached_is_refused() {
 #[test]
 fn a_search_can_be_broken_off() {
     let experiment = sampled(sample_experiments::human_experiment(2.0, [0.0; 3]).expect("valid"));
-    let mut asked = 0;
+    let mut calls = 0;
     let found = resolve(&experiment, 1e-6, &mut || {
-        asked += 1;
+        calls += 1;
         ControlFlow::Break(())
     });
-    assert_eq!((found, asked), (Ok(None), 1));
+    assert_eq!((found, calls), (Ok(None), 1));
 }
 
 #[test]

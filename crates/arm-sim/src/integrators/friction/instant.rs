@@ -109,12 +109,12 @@ fn slope<const N: usize>(
 
 /// Accelerations, and the force on the arm that belongs to them.
 #[derive(Clone, Copy, Debug)]
-struct Answer<const N: usize> {
+struct Response<const N: usize> {
     qdd: Joints<f64, N>,
     force: Plane<f64>,
 }
 
-impl<const N: usize> Answer<N> {
+impl<const N: usize> Response<N> {
     /// Less a multiple of another one.
     fn less(&mut self, factor: f64, other: &Self) {
         for i in 0..N {
@@ -245,11 +245,11 @@ impl<'a, const N: usize> Arm<'a, N> {
         (modes, solved): (&Modes<N>, &Solved<N>),
     ) -> Option<(usize, f64)> {
         let model = self.model;
-        let answer = Answer {
+        let response = Response {
             qdd: solved.outcome.qdd,
             force: solved.outcome.force_on_arm,
         };
-        let through = self.through_joints(&answer);
+        let through = self.through_joints(&response);
         let motion = self.motion.with_joint_force(&through);
         let most = dry_friction(&model.effects, &motion, memory);
         let gain = |j: usize| {
@@ -258,7 +258,7 @@ impl<'a, const N: usize> Arm<'a, N> {
                 return 0.0;
             }
             let others = core::array::from_fn(|k| k != j && modes[k] == Mode::Sticks);
-            let then = self.with_less(j, &answer, &others);
+            let then = self.with_less(j, &response, &others);
             let [y, z] = [0, 1].map(|axis| then[j][axis] - through[j][axis]);
             slope * (y * y + z * z).sqrt()
         };
@@ -301,9 +301,9 @@ impl<'a, const N: usize> Arm<'a, N> {
         let lost = self.contact.1;
         Solved {
             outcome: Outcome {
-                qdd: found.answer.qdd,
-                force_on_arm: found.answer.force,
-                power: powers((found.answer.force, v), [driving, &all], qd, lost),
+                qdd: found.response.qdd,
+                force_on_arm: found.response.force,
+                power: powers((found.response.force, v), [driving, &all], qd, lost),
                 joint_force: motion.joint_force,
             },
             dry: Friction {
@@ -329,14 +329,14 @@ impl<'a, const N: usize> Arm<'a, N> {
     }
 
     /// Forces through the joints \[N\].
-    fn through_joints(&self, answer: &Answer<N>) -> [Plane<f64>; N] {
-        let moving = (&self.motion.qd, &answer.qdd);
+    fn through_joints(&self, response: &Response<N>) -> [Plane<f64>; N] {
+        let moving = (&self.motion.qd, &response.qdd);
         self.model
-            .through_joints(&self.pose, moving, (answer.force, self.input))
+            .through_joints(&self.pose, moving, (response.force, self.input))
     }
 
     #[inline(always)]
-    fn under(&self, torque: &Joints<f64, N>) -> Answer<N> {
+    fn under(&self, torque: &Joints<f64, N>) -> Response<N> {
         let (qdd, force) = match &self.form {
             Form::Links(resistance) => {
                 let force = self.contact.0;
@@ -349,11 +349,11 @@ impl<'a, const N: usize> Arm<'a, N> {
                     .accelerations(self.input, torque, self.contact.0, terms)
             }
         };
-        Answer { qdd, force }
+        Response { qdd, force }
     }
 
     /// What one newton metre in a joint adds, and what it would give way by if nothing held the tip.
-    fn column(&self, joint: usize) -> (Answer<N>, f64) {
+    fn column(&self, joint: usize) -> (Response<N>, f64) {
         let (free, constraint) = match &self.form {
             Form::Links(resistance) => (resistance.column(joint), None),
             Form::Joints(terms, constraint) => {
@@ -366,22 +366,27 @@ impl<'a, const N: usize> Arm<'a, N> {
                 )
             }
         };
-        let mut answer = Answer {
+        let mut response = Response {
             qdd: free,
             force: [0.0; 2],
         };
         if let Some((constraint, [y, z])) = constraint {
-            answer.force = constraint.force([-y, -z]);
-            answer.qdd = sum(&free, &constraint.response(answer.force));
+            response.force = constraint.force([-y, -z]);
+            response.qdd = sum(&free, &constraint.response(response.force));
         }
-        (answer, free[joint])
+        (response, free[joint])
     }
 
     /// Forces through the joints with one newton metre less in a joint, while others stick \[N\].
-    fn with_less(&self, joint: usize, answer: &Answer<N>, sticks: &[bool; N]) -> [Plane<f64>; N] {
+    fn with_less(
+        &self,
+        joint: usize,
+        response: &Response<N>,
+        sticks: &[bool; N],
+    ) -> [Plane<f64>; N] {
         let (mut column, _) = self.column(joint);
         self.hold(&mut column, sticks, &Joints::zeros());
-        let mut less = *answer;
+        let mut less = *response;
         less.less(1.0, &column);
         self.through_joints(&less)
     }
@@ -391,16 +396,16 @@ impl<'a, const N: usize> Arm<'a, N> {
     /// Returns their torques, and which of them stick: not those that nothing but the handle moves.
     fn hold(
         &self,
-        answer: &mut Answer<N>,
+        response: &mut Response<N>,
         sticks: &[bool; N],
         wanted: &Joints<f64, N>,
     ) -> (Joints<f64, N>, [bool; N]) {
         let (mut held, mut torque) = (*sticks, Joints::<f64, N>::zeros());
-        let mut columns = [*answer; N];
+        let mut columns = [*response; N];
         let (mut m, mut left, mut own) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
         for k in (0..N).filter(|&k| sticks[k]) {
             (columns[k], own[k]) = self.column(k);
-            left[k] = answer.qdd[k] - wanted[k];
+            left[k] = response.qdd[k] - wanted[k];
         }
         for k in (0..N).filter(|&k| sticks[k]) {
             for i in (0..N).filter(|&i| sticks[i]) {
@@ -429,10 +434,10 @@ impl<'a, const N: usize> Arm<'a, N> {
             torque[k] = rest / m[k][k];
         }
         for k in (0..N).filter(|&k| held[k]) {
-            answer.less(torque[k], &columns[k]);
+            response.less(torque[k], &columns[k]);
         }
         for k in (0..N).filter(|&k| held[k]) {
-            answer.qdd[k] = wanted[k];
+            response.qdd[k] = wanted[k];
         }
         (torque, held)
     }
@@ -448,7 +453,7 @@ struct Rubbing<'a, const N: usize> {
 
 /// What follows with friction.
 struct Found<const N: usize> {
-    answer: Answer<N>,
+    response: Response<N>,
     dry: Joints<f64, N>,
     most: [f64; N],
     held: [bool; N],
@@ -469,14 +474,14 @@ impl<const N: usize> Rubbing<'_, N> {
             return self.with_joint_forces(arm, motion, net, most);
         }
         let slips = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j]);
-        let mut answer = arm.under(&difference(net, &slips));
+        let mut response = arm.under(&difference(net, &slips));
         let sticks = self.modes.map(|mode| mode == Mode::Sticks);
         let (mut dry, mut held) = (Joints::zeros(), [false; N]);
         if sticks.contains(&true) {
-            (dry, held) = arm.hold(&mut answer, &sticks, &self.wanted.map(|w| -w));
+            (dry, held) = arm.hold(&mut response, &sticks, &self.wanted.map(|w| -w));
         }
         Found {
-            answer,
+            response,
             dry: sum(&dry, &slips),
             most,
             held,
@@ -510,13 +515,13 @@ impl<const N: usize> Rubbing<'_, N> {
         let mut slips = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j]);
         let (mut jam, mut settled) = (None, false);
         for _ in 0..PASSES {
-            let mut answer = arm.under(&difference(net, &slips));
+            let mut response = arm.under(&difference(net, &slips));
             let (mut dry, mut held) = (Joints::zeros(), [false; N]);
             if any {
-                (dry, held) = arm.hold(&mut answer, &sticks, &stop);
+                (dry, held) = arm.hold(&mut response, &sticks, &stop);
             }
             let found = |most, jam| Found {
-                answer,
+                response,
                 dry: sum(&dry, &slips),
                 most,
                 held,
@@ -525,7 +530,7 @@ impl<const N: usize> Rubbing<'_, N> {
             if settled {
                 return found(most, jam);
             }
-            let through = arm.through_joints(&answer);
+            let through = arm.through_joints(&response);
             *motion = motion.with_joint_force(&through);
             most = dry_friction(&model.effects, motion, self.memory);
             let missing = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j] - slips[j]);
@@ -535,7 +540,7 @@ impl<const N: usize> Rubbing<'_, N> {
             if jam.is_some() || lost || missing.amax() <= 1e-12 * size {
                 return found(most, jam);
             }
-            let gains = self.gains(arm, motion, (&answer, &through, &most), &sticks);
+            let gains = self.gains(arm, motion, (&response, &through, &most), &sticks);
             let (change, determinant) = newton(&gains, &missing);
             if determinant <= SINGLE {
                 jam = Some(strongest(&gains));
@@ -544,10 +549,10 @@ impl<const N: usize> Rubbing<'_, N> {
             slips += change;
         }
         jam = Some((0, f64::INFINITY));
-        let mut answer = arm.under(&difference(net, &slips));
-        let (dry, held) = arm.hold(&mut answer, &sticks, &stop);
+        let mut response = arm.under(&difference(net, &slips));
+        let (dry, held) = arm.hold(&mut response, &sticks, &stop);
         Found {
-            answer,
+            response,
             dry: sum(&dry, &slips),
             most,
             held,
@@ -560,7 +565,7 @@ impl<const N: usize> Rubbing<'_, N> {
         &self,
         arm: &Arm<'_, N>,
         motion: &Motion<f64, N>,
-        (answer, through, most): (&Answer<N>, &[Plane<f64>; N], &[f64; N]),
+        (response, through, most): (&Response<N>, &[Plane<f64>; N], &[f64; N]),
         sticks: &[bool; N],
     ) -> [[f64; N]; N] {
         let model = arm.model;
@@ -576,7 +581,7 @@ impl<const N: usize> Rubbing<'_, N> {
             if !matches!(self.modes[k], Mode::Slips(way) if way != 0.0) {
                 continue;
             }
-            let then = arm.with_less(k, answer, sticks);
+            let then = arm.with_less(k, response, sticks);
             for j in 0..N {
                 let [y, z] = through[j];
                 let size = motion.joint_force[j];

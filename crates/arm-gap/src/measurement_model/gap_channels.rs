@@ -1,4 +1,4 @@
-//! Channels as a gap is measured to them.
+//! The channels in which a gap is measured.
 
 use arm_sim::SimulationError;
 

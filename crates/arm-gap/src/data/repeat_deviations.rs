@@ -1,4 +1,4 @@
-//! What the repeats of a movement differ by, which noise is read off.
+//! Deviations of the repeats of a movement from their mean, from which the noise is estimated.
 
 use crate::data::noise::{Thinned, orthogonal, project_off};
 use crate::data::prepared_session::PreparedSession;

@@ -1,4 +1,4 @@
-//! Where joints with dry friction rest: what they hold there is not known, and less is compared.
+//! Samples at which joints with dry friction rest: static friction is unknown there, so that fewer force components are compared.
 
 use std::sync::Arc;
 
@@ -81,7 +81,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         let count = course.seen[0].len();
         match point.lines.get(group) {
             Some(line) if N <= 2 && self.session.comparison == ComparisonMode::Led => {
-                let told = |i: usize| match held(i)[..] {
+                let observable = |i: usize| match held(i)[..] {
                     [] => ObservableForce::Both,
                     // The torque of the other joint, as a component of the force.
                     [j] if N == 2 => {
@@ -98,12 +98,12 @@ impl<const N: usize> PreparedSession<'_, N> {
                 };
                 Rest {
                     left_out: Vec::new(),
-                    told: Arc::new((0..count).map(told).collect()),
+                    observable: Arc::new((0..count).map(observable).collect()),
                 }
             }
             _ => Rest {
                 left_out: (0..count).map(|i| !held(i).is_empty()).collect(),
-                told: Arc::default(),
+                observable: Arc::default(),
             },
         }
     }

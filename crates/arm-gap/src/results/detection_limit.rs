@@ -1,3 +1,5 @@
+//! Effects that were not named: the smallest size that the data would have shown, and the steps of the search.
+
 use arm_core::effect::Effect;
 use serde::Serialize;
 
@@ -200,11 +202,11 @@ mod tests {
         let mut along_y = ruled("backlash", 0, (4.0, 20.0, 1e-5));
         along_y.smallest = vec![1e-5];
         let limits = limits(&[play, along_y], &[], &[]);
-        let told: Vec<_> = limits
+        let found: Vec<_> = limits
             .iter()
             .map(|l| (l.parameter.as_str(), l.at_least))
             .collect();
-        assert_eq!(told, [("y", Some(1e-5)), ("z", Some(3e-3))]);
+        assert_eq!(found, [("y", Some(1e-5)), ("z", Some(3e-3))]);
     }
 
     #[test]
@@ -222,10 +224,10 @@ mod tests {
         ];
         let named = [("viscous".to_owned(), Some(2), None)];
         let limits = limits(&all, &named, &[]);
-        let told: Vec<_> = limits.iter().map(|l| (l.kind.as_str(), l.joint)).collect();
+        let found: Vec<_> = limits.iter().map(|l| (l.kind.as_str(), l.joint)).collect();
         let (coulomb, viscous) = (("coulomb", Some(1)), ("viscous", Some(1)));
         let rotor = ("motor_inertia", Some(3));
-        assert_eq!(told, [coulomb, viscous, ("force_bias", None), rotor]);
+        assert_eq!(found, [coulomb, viscous, ("force_bias", None), rotor]);
         let dry = &limits[0];
         assert_eq!((dry.gain, dry.price, dry.at_least), (8.0, 20.0, Some(0.03)));
         assert_eq!(
@@ -241,12 +243,12 @@ mod tests {
     fn a_law_of_a_joint_that_friction_holds_is_seen_at_no_size() {
         let spring = Effect::new(Kind::Elastic, 2);
         let limits = limits(&[ruled("viscous", 0, (1.0, 20.0, 0.1))], &[], &[spring]);
-        let told: Vec<_> = limits
+        let found: Vec<_> = limits
             .iter()
             .map(|l| (l.kind.as_str(), l.joint, l.at_least))
             .collect();
         assert_eq!(
-            told,
+            found,
             [("viscous", Some(1), Some(0.1)), ("elastic", Some(3), None)]
         );
     }

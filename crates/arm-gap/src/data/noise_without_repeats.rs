@@ -22,11 +22,11 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// sample is weighted by the residuals around it, with the mean over all as one sample more.
     ///
     /// * `range` - size of each channel, a share of which is the floor of the noise
-    /// * `told` - share of the samples of each channel that are observable
+    /// * `observable_share` - share of the samples of each channel that are observable
     pub(crate) fn noise_of_residuals(
         &self,
         point: &LinearizationPoint<N>,
-        (range, told): (&[f64], &[f64]),
+        (range, observable_share): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
         let mut left = self.unexplained(point)?;
         let mut weights = vec![Channels::new(); self.courses.len()];
@@ -60,7 +60,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 weights[trial].push(whole);
             }
         }
-        Noise::without_repeats(&left, range, (told, weights))
+        Noise::without_repeats(&left, range, (observable_share, weights))
     }
 
     /// What is left of residuals when everything that the catalogue could explain is taken out, to first order.

@@ -1,3 +1,5 @@
+//! The result of a search, and of a first-order screening.
+
 use std::sync::Arc;
 
 use arm_model::{Effect, Model, Refused};
@@ -6,7 +8,7 @@ use serde::{Serialize, Serializer};
 
 use super::absorbed::{absorbed, stopped};
 use super::channel_gap::channel_gaps;
-use super::limit::limits;
+use super::detection_limit::limits;
 use super::{
     Absorbed, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, SearchInput,
     SearchStep, SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
@@ -84,14 +86,14 @@ impl GapResult {
     pub fn of<const N: usize>(
         prepared: &PreparedSession<'_, N>,
         finding: &Finding<N>,
-        asked: &SearchInput<'_>,
+        input: &SearchInput<'_>,
     ) -> Result<Self, Refused> {
         let [calibrated, amended] = finding.in_trials.each_ref().map(Vec::as_slice);
         let plays = [
             (Version::Calibrated, calibrated),
             (Version::Amended, amended),
         ];
-        let trials = SimulatedTrial::played(prepared, asked, &plays);
+        let trials = SimulatedTrial::played(prepared, input, &plays);
         let [before, after] = &finding.lack;
         let share = if before.excess.is_finite() && before.excess > 0.0 {
             at_least(after.excess, 0.0) / before.excess
@@ -100,7 +102,7 @@ impl GapResult {
         };
         let led = prepared.session.comparison == ComparisonMode::Led;
         let gap = channel_gaps(&trials, (N, led), Version::Amended);
-        let mut effects = effects(finding, asked);
+        let mut effects = effects(finding, input);
         let verdict = Verdict::of(&Evidence {
             named: !effects.is_empty(),
             is_open: gap.values().any(|gap| gap.open.is_some()),
@@ -127,7 +129,7 @@ impl GapResult {
             .collect();
         let amended = Fitted::of(&finding.amended.hypothesis);
         let unknowns = finding.precision.coordinates.iter();
-        let refitted_far = stopped(asked, &finding.amended.hypothesis, unknowns.clone());
+        let refitted_far = stopped(input, &finding.amended.hypothesis, unknowns.clone());
         Ok(Self {
             verdict,
             places: Vec::new(),
@@ -140,14 +142,14 @@ impl GapResult {
             },
             effects,
             looks_like: None,
-            absorbed: absorbed(asked, &finding.amended.hypothesis, unknowns),
+            absorbed: absorbed(input, &finding.amended.hypothesis, unknowns),
             lack: finding.lack.each_ref().map(Lack::from),
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
             warnings: held_in_motion(prepared.session)
                 .into_iter()
                 .chain(refitted_far)
                 .collect(),
-            model: amended.amended(asked.model, &locked)?,
+            model: amended.amended(input.model, &locked)?,
             calibrated: Fitted::of(&finding.calibrated.hypothesis),
             amended,
             rhythms: rhythms().map(|a| Effect::from_core(&a.effect)).collect(),
@@ -170,11 +172,11 @@ impl GapResult {
 }
 
 /// Every named effect, that which explains most first.
-fn effects<const N: usize>(finding: &Finding<N>, asked: &SearchInput<'_>) -> Vec<Missing> {
+fn effects<const N: usize>(finding: &Finding<N>, input: &SearchInput<'_>) -> Vec<Missing> {
     let together = finding.named.iter();
-    let together = together.map(|n| Missing::named(n, finding, asked));
+    let together = together.map(|n| Missing::named(n, finding, input));
     let apart = finding.trial_specific.iter();
-    let apart = apart.map(|a| Missing::trial_specific(a, finding, asked));
+    let apart = apart.map(|a| Missing::trial_specific(a, finding, input));
     let mut all: Vec<_> = together.chain(apart).collect();
     all.sort_by(|a, b| b.share.total_cmp(&a.share));
     all
@@ -276,16 +278,16 @@ impl Screening {
     pub fn of<const N: usize>(
         prepared: &PreparedSession<'_, N>,
         look: &Look<N>,
-        asked: &SearchInput<'_>,
+        input: &SearchInput<'_>,
     ) -> Result<Self, Refused> {
         let plays = [(Version::Calibrated, look.in_trials.as_slice())];
-        let trials = SimulatedTrial::played(prepared, asked, &plays);
+        let trials = SimulatedTrial::played(prepared, input, &plays);
         let hypothesis = &look.calibrated.hypothesis;
         let led = prepared.session.comparison == ComparisonMode::Led;
         let nuisances = prepared.session.nuisances();
         Ok(Self {
-            model: Fitted::of(hypothesis).amended(asked.model, &[])?,
-            absorbed: absorbed(asked, hypothesis, nuisances.iter()),
+            model: Fitted::of(hypothesis).amended(input.model, &[])?,
+            absorbed: absorbed(input, hypothesis, nuisances.iter()),
             gap: channel_gaps(&trials, (N, led), Version::Calibrated),
             lack: Lack::from(&look.lack),
             suspects: look.suspects.iter().map(Suspect::of).collect(),

@@ -1,3 +1,5 @@
+//! Trials, measured and simulated with each version of the model.
+
 use std::sync::Arc;
 
 use arm_ident::regression::trial::Role;
@@ -81,7 +83,7 @@ impl SimulatedTrial {
     /// Every trial of a session with what the model as given and other hypotheses, as they are in each trial, show of it.
     pub(super) fn played<const N: usize>(
         prepared: &PreparedSession<'_, N>,
-        asked: &SearchInput<'_>,
+        input: &SearchInput<'_>,
         plays: &[(Version, &[Hypothesis<N>])],
     ) -> Vec<Self> {
         let session = prepared.session;
@@ -90,7 +92,7 @@ impl SimulatedTrial {
         given.known.truncate(session.effects.len());
         let one = |i: usize| {
             let course = prepared.courses[i].as_ref();
-            let mut trial = Self::measured(session, (i, &asked.trials[i].file), course);
+            let mut trial = Self::measured(session, (i, &input.trials[i].file), course);
             trial.group = prepared.group_of[i];
             for (k, counted) in trial.counted.iter_mut().enumerate() {
                 *counted &= !prepared.is_left_out(i, k as f64 / course.rate);
