@@ -19,9 +19,12 @@ __all__ = [
     "DECISIONS",
     "JOINT_LAWS",
     "MISFIT",
+    "MOST_STEPS",
     "SAMPLE_STATUSES",
     "SPEED_NOISE_ALLOWED",
     "STILL",
+    "THRESHOLD",
+    "TIE",
     "Absorbed",
     "AddedMass",
     "Alternative",
@@ -108,7 +111,10 @@ __version__: str
 build_profile: str
 DECISIONS: tuple[str, str, str]
 MISFIT: float
+MOST_STEPS: float
 STILL: float
+THRESHOLD: float
+TIE: float
 SPEED_NOISE_ALLOWED: float
 JOINT_LAWS: tuple[tuple[str, str, str], ...]
 """The laws that a `[[joint]]` states: the key of the size of each, its kind, and the parameter that the size is."""

@@ -272,4 +272,4 @@ def keys(place: str, found: Iterable[str], *, required: Iterable[str] = (), opti
             raise unknown_name(place, key, known)
     for key in required:
         if key not in found:
-            raise BadInput(f"{place}, {key}" if place else key, _MISSING, f"key {key} is required")
+            raise BadInput(f"{place}, {key}" if place else key, _MISSING, f"key {key} is required", kind="missing_key")

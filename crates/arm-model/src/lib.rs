@@ -58,7 +58,7 @@ pub use fields::{Bounds, Fields};
 pub use joint::{Joint, joint_laws};
 pub use model::{MAX_SEGMENTS, Model, Parts};
 pub use parameter::{Object, ParameterId, ParameterInfo};
-pub use refused::{Refused, nearest, unknown};
+pub use refused::{RefusalKind, Refused, nearest, unknown};
 pub use robot::Robot;
 pub use segment::Segment;
 pub use subject::{Sex, Subject};

@@ -42,6 +42,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(gap::play, m)?)?;
     m.add_function(wrap_pyfunction!(gap::reach, m)?)?;
     m.add("STILL", arm_gap::data::identified_base::STILL)?;
+    m.add("MOST_STEPS", arm_sim::MOST_STEPS)?;
     m.add_function(wrap_pyfunction!(custom_effects::declare, m)?)?;
     m.add_function(wrap_pyfunction!(simulation::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(simulation::simulate_accurately, m)?)?;

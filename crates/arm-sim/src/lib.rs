@@ -29,6 +29,7 @@ pub use experiment::handle_path::{Handle, HandlePath};
 pub use experiment::movement::{JointMotion, Movement};
 pub use experiment::piecewise_cubic::{Interpolation, Jet, Series, cubic_weights};
 pub use experiment::sample_experiments;
+pub use experiment::step_grid::MOST_STEPS;
 pub use free_memory::{require_memory, reserve_memory};
 pub use laboratory::interaction_control::{
     Interaction, InteractionLaw, Support, Yielded, interact,

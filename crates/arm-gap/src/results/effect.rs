@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Named, SearchInput, Value, at_most, placed};
 use crate::measurement_model::hypothesis::Target;
 use crate::selection::conclusion::Finding;
-use crate::selection::model_selection::{self, FittedAlternative, TIE};
+use crate::selection::model_selection::{self, FittedAlternative};
 use crate::trial_specific::component::TrialSpecific;
 
 /// A movement that would distinguish two explanations.
@@ -55,6 +55,8 @@ pub struct Alternative {
     pub free: Vec<usize>,
 }
 
+/// Difference of twice the log-likelihood up to which two laws explain the data as well: odds of 150.
+pub const TIE: f64 = model_selection::TIE;
 /// An alternative explains the data as well below so many units of twice the log-likelihood, and nearly as well up to [`TIE`].
 const AS_WELL: f64 = 2.0;
 /// It explains them better from so many on.

@@ -17,7 +17,7 @@ pub use absorbed::Absorbed;
 pub use amended::Fitted;
 pub use channel_gap::{ChannelGap, Open, channel_names, confirmed};
 pub use detection_limit::{Limit, SearchStep, Suspect, Tried};
-pub use effect::{Alternative, Missing, Place, Separation};
+pub use effect::{Alternative, Missing, Place, Separation, TIE};
 pub use gap_result::{GapResult, Lack, Screening};
 pub use root_mean_square::{pairwise_sum, root_mean_square};
 pub use search_input::{SearchInput, TrialFile};

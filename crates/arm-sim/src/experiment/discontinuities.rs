@@ -6,7 +6,7 @@
 //! acceleration at the end of a step is that after the jump. So steps end at every such time, and the drive of each piece is
 //! that inside the piece.
 
-use crate::experiment::step_grid::Schedule;
+use crate::experiment::step_grid::StepGrid;
 use crate::{Coupling, Drive, Experiment};
 
 /// Nearer to a point of the grid than this, in steps, a break lies on it: what it still does is as the square of that.
@@ -29,7 +29,7 @@ impl Discontinuities {
     ///
     /// On the grid they matter only where a value jumps that acts on the arm directly: the acceleration of a handle that holds it
     /// rigidly, or a torque.
-    pub fn of<const N: usize>(experiment: &Experiment<N>, schedule: &Schedule) -> Self {
+    pub fn of<const N: usize>(experiment: &Experiment<N>, schedule: &StepGrid) -> Self {
         let (times, acts_directly) = match &experiment.drive {
             Drive::Handle { path, coupling } => (path.breaks(), *coupling == Coupling::Rigid),
             Drive::Torque(Some(series)) => (series.times().to_vec(), true),

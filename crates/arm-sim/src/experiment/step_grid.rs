@@ -2,12 +2,12 @@
 
 use crate::{Experiment, SimulationError};
 
-/// Longest run: at 4 kHz three days. More is a slip of units.
-const MOST_STEPS: f64 = 1e9;
+/// Most steps of a run: at 4 kHz three days. More is an error of units.
+pub const MOST_STEPS: f64 = 1e9;
 
 /// When steps are made and samples taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Schedule {
+pub(crate) struct StepGrid {
     /// Step \[s\].
     pub dt: f64,
     /// Number of steps.
@@ -16,7 +16,7 @@ pub(crate) struct Schedule {
     pub every: usize,
 }
 
-impl Schedule {
+impl StepGrid {
     /// Samples of a complete run, the start included.
     pub fn samples(&self) -> usize {
         self.steps / self.every + 1

@@ -11,7 +11,7 @@ use crate::closed_chain::stability;
 use crate::closed_chain::state::{BaseMotion, Input};
 use crate::error::finite;
 use crate::experiment::discontinuities::Discontinuities;
-use crate::experiment::step_grid::Schedule;
+use crate::experiment::step_grid::StepGrid;
 use crate::free_memory::require_memory;
 use crate::preparation::initial_state;
 use crate::{
@@ -27,7 +27,7 @@ pub(crate) struct Prepared<'a, const N: usize> {
     /// The rig with all effects applied.
     pub setup: Setup<f64, N>,
     pub model: Model<f64, N>,
-    pub schedule: Schedule,
+    pub schedule: StepGrid,
     /// Where the drive is not smooth.
     pub discontinuities: Discontinuities,
     /// Angles and speeds at the start.
@@ -46,7 +46,7 @@ impl<'a, const N: usize> Prepared<'a, N> {
         experiment: &'a Experiment<N>,
         in_pieces: bool,
     ) -> Result<Self, SimulationError> {
-        let schedule = Schedule::of(experiment)?;
+        let schedule = StepGrid::of(experiment)?;
         refuse_unknown_activity(&experiment.effects, experiment.activity.is_some())?;
         let setup = experiment.altered()?;
         let model = model_of(experiment, &setup)?;
@@ -157,7 +157,7 @@ const ABREAST: usize = 16;
 /// [`command`] after each of some numbers of half steps, appended to `out`; the same bits.
 pub(crate) fn commands<const N: usize>(
     experiment: &Experiment<N>,
-    schedule: &Schedule,
+    schedule: &StepGrid,
     half_steps: &[usize],
     out: &mut Vec<Input<f64, N>>,
 ) {
@@ -213,7 +213,7 @@ pub(crate) fn refuse_unknown_activity(
 
 struct Abreast<'a, const N: usize> {
     path: &'a HandlePath<N>,
-    schedule: &'a Schedule,
+    schedule: &'a StepGrid,
     half_steps: &'a [usize],
     out: &'a mut Vec<Input<f64, N>>,
 }
@@ -335,7 +335,7 @@ fn link<const N: usize>(
 /// Whether the drive is known for the whole run.
 pub(crate) fn known<const N: usize>(
     experiment: &Experiment<N>,
-    schedule: &Schedule,
+    schedule: &StepGrid,
 ) -> Result<(), SimulationError> {
     let drive = match &experiment.drive {
         Drive::Handle { path, .. } => Some(("the handle's path", path.span())),
@@ -369,7 +369,7 @@ pub(crate) fn known<const N: usize>(
 /// Commanded robot motion at some samples, or why it does not get there; nothing without a robot.
 fn reached<const N: usize>(
     experiment: &Experiment<N>,
-    schedule: &Schedule,
+    schedule: &StepGrid,
     samples: Range<usize>,
 ) -> impl Iterator<Item = Result<JointMotion<2>, SimulationError>> {
     let led = match (&experiment.robot, &experiment.drive) {

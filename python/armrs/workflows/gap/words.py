@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..._armrs import MISFIT
+from ..._armrs import MISFIT, TIE
 from ...report import tables
 from ...report import words as common
 from ...report.tables import Table, digits, number, smallest_effects, spread, with_interval
 from . import headline
-from .headline import TIE, effect_name, joined
+from .headline import effect_name, joined
 
 verdict = headline.headline
 """The result in one sentence."""
