@@ -202,7 +202,7 @@ guide: $(STAMPS)/dev ## add the effect of the developer guide to a copy, as it s
 	$(BIN)/python -m pytest --quiet tests/test_stated.py
 
 # The kernels and the verdict; what survives is answered in docs/developer.md.
-MUTATED := crates/arm-core/src/dynamics.rs crates/arm-core/src/gravity.rs crates/arm-core/src/inertia.rs crates/arm-core/src/coriolis.rs
+MUTATED := $(addprefix crates/arm-core/src/dynamics/,inverse_and_forward.rs gravity.rs inertia.rs coriolis.rs)
 mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels and verdict: hours. Needs cargo-mutants
 	cargo mutants -p arm-gap -f crates/arm-gap/src/results/verdict.rs -o out/mutants/verdict --cargo-arg=--lib -- verdict
 	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants/kernels --cargo-arg=--test --cargo-arg=suite

@@ -43,7 +43,7 @@ int main(void) {
   for (size_t i = 0; i < (size_t)head[0]; i++) {
     armrs_sample sample = {{0}, {0}, 0, {{0}, {0}, 0}};
     armrs_motion motion = {0, {0}, {0}, {0}};
-    armrs_sample_status heed;
+    armrs_sample_status sample_status;
     armrs_real status, torque[ARMRS_JOINTS], sd[ARMRS_JOINTS];
     if (!take(row, sizeof row / sizeof *row)) return 7;
     for (size_t j = 0; j < ARMRS_JOINTS; j++) {
@@ -54,8 +54,8 @@ int main(void) {
     sample.load.force_on_arm[1] = row[2 + 2 * ARMRS_JOINTS];
     sample.load.moment_on_arm = row[3 + 2 * ARMRS_JOINTS];
     motion.time = head[1] * (armrs_real)i;
-    if (armrs_estimator_update(&estimator, row[0] != 0 ? &sample : NULL, &heed) != ARMRS_OK) return 8;
-    status = (armrs_real)heed;
+    if (armrs_estimator_update(&estimator, row[0] != 0 ? &sample : NULL, &sample_status) != ARMRS_OK) return 8;
+    status = (armrs_real)sample_status;
     give(&status, 1);
     give_carried(armrs_estimator_carry(&estimator, &motion, torque, sd), torque, sd);
     motion.time = 0;

@@ -201,7 +201,7 @@ def test_the_source_is_plain_c_and_cpp(compiler: list[str], tmp_path: Path) -> N
 def test_the_firmware_example_carries_an_arm_a_tenth_heavier_than_the_one_that_was_recorded() -> None:
     """Erratum 42: table 1 of appendix D has moments of inertia about the long axes; both arms have those of de Leva (1996) about the joints."""
     number = r"(?:\(armrs_real\))?([0-9.]+)"
-    rust = re.search(r"fn human_arm.*?\n}", (ROOT / "crates/arm-core/src/models.rs").read_text(encoding="utf-8"), flags=re.S)
+    rust = re.search(r"fn human_arm.*?\n}", (ROOT / "crates/arm-core/src/arm/sample_arms.rs").read_text(encoding="utf-8"), flags=re.S)
     c = re.search(r"segments\[ARMRS_JOINTS\] = {.*?};", (ROOT / "firmware/main.c").read_text(encoding="utf-8"), flags=re.S)
     assert rust and c
     recorded = np.array(re.findall(r"segment\(([0-9.]+), ([0-9.]+), ([0-9.]+), ([0-9.]+)\)", rust[0]), dtype=float)

@@ -48,7 +48,7 @@ def test_other_tools_are_given_the_arm_of_armrs(monkeypatch: pytest.MonkeyPatch)
     """Moments of inertia had changed in one place only."""
     monkeypatch.syspath_prepend(str(PEERS))
     problem = importlib.import_module("problem")
-    source = (ROOT / "crates" / "arm-core" / "src" / "models.rs").read_text(encoding="utf-8")
+    source = (ROOT / "crates" / "arm-core" / "src" / "arm" / "sample_arms.rs").read_text(encoding="utf-8")
     body = re.search(r"fn human_arm\(\).*?\n}", source, flags=re.S)
     assert body is not None
     rows = np.array([[float(value) for value in row.split(",")] for row in re.findall(r"segment\(([\d., ]+)\)", body[0])])

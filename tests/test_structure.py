@@ -145,7 +145,7 @@ NAMED = {
     "crates/arm-gap/src/measurement_model/start.rs": "the torque that holds a joint is a constant moment",
     "crates/arm-model/src/joint.rs": "the keys of a joint are short for effects",
     "crates/arm-py/src/model/parts.rs": "the keys of a joint",
-    "crates/arm-sim/src/models.rs": "samples",
+    "crates/arm-sim/src/experiment/sample_experiments.rs": "samples",
 }
 """Files that name a kind of effect, and why."""
 
@@ -153,7 +153,7 @@ NAMED = {
 def test_a_kind_of_effect_is_named_in_its_own_file() -> None:
     """Other code asks a kind for its properties, so that a new one needs no more than its file and a line of the catalogue."""
     own = ROOT / "crates" / "arm-core" / "src" / "effect"
-    names = {path.stem for path in own.glob("*.rs")} - {"own", "own_absent"}
+    names = {path.stem for path in own.glob("*.rs")} - {"custom_effect", "custom_effect_absent"}
     kinds = {name.title().replace("_", "") for name in names}
     assert {"Coulomb", "StretchReflex"} <= kinds
     crates = [path for path in RUST if not is_test(path) and own not in path.parents and "examples" not in path.parts]

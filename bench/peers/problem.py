@@ -1,6 +1,6 @@
 """The workloads as numbers: the arm, its movement, and the files that every tool reads.
 
-One place for all of them: C and C++ get a header, Python imports this module, Rust has the same arm as `arm_sim::models`.
+One place for all of them: C and C++ get a header, Python imports this module, Rust has the same arm as `arm_sim::sample_experiments`.
 """
 
 from __future__ import annotations

@@ -19,9 +19,12 @@ __all__ = [
     "DECISIONS",
     "JOINT_LAWS",
     "MISFIT",
+    "MOST_STEPS",
     "SAMPLE_STATUSES",
     "SPEED_NOISE_ALLOWED",
     "STILL",
+    "THRESHOLD",
+    "TIE",
     "Absorbed",
     "AddedMass",
     "Alternative",
@@ -94,7 +97,7 @@ __all__ = [
     "online_settings",
     "play",
     "reach",
-    "require_room",
+    "require_memory",
     "resolve",
     "simulate",
     "simulate_accurately",
@@ -108,7 +111,10 @@ __version__: str
 build_profile: str
 DECISIONS: tuple[str, str, str]
 MISFIT: float
+MOST_STEPS: float
 STILL: float
+THRESHOLD: float
+TIE: float
 SPEED_NOISE_ALLOWED: float
 JOINT_LAWS: tuple[tuple[str, str, str], ...]
 """The laws that a `[[joint]]` states: the key of the size of each, its kind, and the parameter that the size is."""
@@ -1680,7 +1686,7 @@ def distances(
     rivals: Sequence[Alternative],
 ) -> list[list[float] | None]: ...
 def effects() -> list[_Kind]: ...
-def require_room(needed: int) -> None: ...
+def require_memory(needed: int) -> None: ...
 def online_settings(rig: Rig, period: float, precision: str) -> _OnlineSettings: ...
 def firmware(rig: Rig, uncertainty: float, samples: Sequence[Sequence[float]]) -> _Firmware: ...
 def find_gap(

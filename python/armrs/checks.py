@@ -149,9 +149,9 @@ def samples(place: str, value: object, unit: str = "", *, shape: Sequence[int | 
     if raw.dtype.kind not in "iuf":
         raise BadInput(place, Text(_KINDS.get(raw.dtype.kind, str(raw.dtype))) if raw.ndim else value, allowed)
     if 0 in raw.strides:  # numbers that are held once and shared by views; users copy them
-        from ._armrs import require_room
+        from ._armrs import require_memory
 
-        require_room(8 * raw.size)
+        require_memory(8 * raw.size)
     result = np.asarray(raw, dtype=float)
     if shape is not None:
         fits = len(shape) == result.ndim and all(want in (None, have) for want, have in zip(shape, result.shape, strict=True))
@@ -272,4 +272,4 @@ def keys(place: str, found: Iterable[str], *, required: Iterable[str] = (), opti
             raise unknown_name(place, key, known)
     for key in required:
         if key not in found:
-            raise BadInput(f"{place}, {key}" if place else key, _MISSING, f"key {key} is required")
+            raise BadInput(f"{place}, {key}" if place else key, _MISSING, f"key {key} is required", kind="missing_key")

@@ -5,10 +5,13 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Literal
 
 WRITABLE = "a place that can be written"
 """What is allowed where a file or folder cannot be made."""
+RefusalKind = Literal["value", "missing_key", "missing_file", "missing_source"]
+"""In which way an input cannot be used: a value that is not allowed, a required key that is missing, a file that does not exist, or one
+that does not exist where other things than a file are allowed. `arm_model::RefusalKind` has the first three."""
 _ALIKE = 0.5
 """Least similarity of names, from 0 to 1, at which one is suggested for the other."""
 
@@ -44,6 +47,8 @@ class BadInput(ArmrsError, ValueError):
         The file, as the caller named it.
     hint : str, optional
         What was probably meant.
+    kind : str
+        In which way the input cannot be used, a `RefusalKind`.
     """
 
     def __init__(
@@ -54,6 +59,7 @@ class BadInput(ArmrsError, ValueError):
         *,
         file: str | os.PathLike[str] | None = None,
         hint: str | None = None,
+        kind: RefusalKind = "value",
     ) -> None:
         super().__init__(place, found, allowed)
         self.place = place
@@ -61,6 +67,7 @@ class BadInput(ArmrsError, ValueError):
         self.allowed = allowed
         self.file = None if file is None else os.fspath(file)
         self.hint = hint
+        self.kind = kind
 
     def within(self, *, file: str | os.PathLike[str] | None = None, place: str | None = None) -> BadInput:
         """Return this error seen from further outside: with the file, or with the table that holds the place."""
@@ -71,10 +78,11 @@ class BadInput(ArmrsError, ValueError):
             self.allowed,
             file=self.file if file is None else file,
             hint=self.hint,
+            kind=self.kind,
         )
 
     def __str__(self) -> str:
-        where, said = _worded(self.place, self.found, self.allowed)
+        where, said = _worded(self)
         text = ": ".join(one_line(part) for part in (self.file, where, said) if part)
         return f"{text} ({one_line(self.hint)})" if self.hint else text
 
@@ -102,7 +110,7 @@ class BadInputs(BadInput):
         first, others = listed[0], len(listed) - 1
         more = f"and {others} more problem{'s' * (others > 1)}, which {told_by}"
         hint = f"{first.hint}; {more}" if first.hint else more
-        made = cls(first.place, first.found, first.allowed, file=first.file, hint=hint)
+        made = cls(first.place, first.found, first.allowed, file=first.file, hint=hint, kind=first.kind)
         made.problems = listed
         return made
 
@@ -160,9 +168,6 @@ class Sentence(Text):
 
 
 NO_FILE = Text("no such file")
-_NO_FILE = (NO_FILE, "No such file or directory")
-_READABLE = ("that can be read", "a file that exists")
-"""Ends of what is allowed that say no more than that the file should be there."""
 _OF_TRIALS = {
     "configuration": "the name of the movement, shared by its repeats",
     "file": "the file of the samples",
@@ -172,18 +177,26 @@ _OF_TRIALS = {
 """Required keys of a trial with their meaning."""
 
 
-def _worded(place: str, found: object, allowed: str) -> tuple[str, str]:
+def _worded(refusal: BadInput) -> tuple[str, str]:
     """Return the place and what is wrong there: what is missing in words of its own, all else as found and allowed."""
-    table, _, key = place.rpartition(", ")
+    found, allowed = refusal.found, refusal.allowed
+    table, _, key = refusal.place.rpartition(", ")
     if isinstance(found, Sentence):
         return "", f"{found}; {allowed}"
-    text = found if isinstance(found, str) else None
-    if text == "nothing" and allowed == f"key {key} is required":
+    if refusal.kind == "missing_key":
         meaning = _OF_TRIALS.get(key) if table.startswith("[[trial]]") else None
         return "", f"`{key}` is missing{f' in {table}' if table else ''}{f': {meaning}' if meaning else ''}"
-    if key == "file" and text in _NO_FILE and allowed != WRITABLE:
-        return table, NO_FILE if allowed.endswith(_READABLE) else f"{NO_FILE}, allowed {allowed}"
-    return place, f"found {found if isinstance(found, Text) else show(found)}, allowed {allowed}"
+    if refusal.kind == "missing_file":
+        return table, NO_FILE
+    if refusal.kind == "missing_source":
+        return table, f"{NO_FILE}, allowed {allowed}"
+    return refusal.place, f"found {found if isinstance(found, Text) else show(found)}, allowed {allowed}"
+
+
+def unreadable(error: OSError, what: str = "a file", *, file: str | os.PathLike[str] | None = None) -> BadInput:
+    """Build the refusal of a file that the system does not read; `what` names what it should be."""
+    kind: RefusalKind = "missing_file" if isinstance(error, FileNotFoundError) else "value"
+    return BadInput("file", Text(error.strerror or "unreadable"), f"{what} that can be read", file=file, kind=kind)
 
 
 def not_utf8(place: str, raw: bytes, error: UnicodeDecodeError, *, file: str | os.PathLike[str] | None = None) -> BadInput:

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::path::PathBuf;
 use std::ptr::{null, null_mut};
 
-use arm_core::{Contact, Joints, Setup, models};
+use arm_core::{Contact, Joints, Setup, sample_arms};
 use arm_cosim::{ArmSpec, Slave, StartSpec};
 use arm_fmu::{Handle, fmi3};
 use arm_sim::{Coupling, Drive, Experiment, HandlePath, Port, Start, simulate};
@@ -21,7 +21,10 @@ type Get = unsafe extern "C" fn(Handle, *const u32, usize, *mut f64, usize) -> c
 
 /// The human arm on a contact, held by a handle that rests.
 fn experiment() -> Experiment<3> {
-    let setup = Setup::new(&models::human_arm(), Contact::new([10_000.0; 2], [25.0; 2]));
+    let setup = Setup::new(
+        &sample_arms::human_arm(),
+        Contact::new([10_000.0; 2], [25.0; 2]),
+    );
     let drive = Drive::Handle {
         path: HandlePath::fixed(HANDLE).expect("a point"),
         coupling: Coupling::Compliant,

@@ -9,7 +9,7 @@ use arm_core::effect::{Effect, KINDS, Kind, Motion, Place, resisting_torque};
 use arm_core::{
     Chain, Contact, Elbow, Joints, Lanes, Limits, Load, Path, Plane, Pose, Robot, Scalar, Shape,
     contributions, coriolis, coriolis_matrix, forward_dynamics, gravity, inertia, inverse_dynamics,
-    jacobian, joint_force, kinetic_energy, models, regressor, tip, tip_velocity,
+    jacobian, joint_force, kinetic_energy, regressor, sample_arms, tip, tip_velocity,
 };
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
@@ -176,7 +176,7 @@ fn effects<T: Scalar, const N: usize>(
 }
 
 fn arm_kernels(c: &mut Criterion) {
-    let (two, three) = (models::mechanical_arm(), models::human_arm());
+    let (two, three) = (sample_arms::mechanical_arm(), sample_arms::human_arm());
     kernels::<f64, 2>(c, "2 joints, f64", 1, &two);
     kernels::<f64, 3>(c, "3 joints, f64", 1, &three);
     kernels::<Lanes<4>, 2>(c, "2 joints, 4 lanes", 4, &two);

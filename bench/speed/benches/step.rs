@@ -2,11 +2,12 @@
 
 use std::hint::black_box;
 
-use arm_sim::{Experiment, Integrator, models, simulate, simulate_batch};
+use arm_sim::{Experiment, Integrator, sample_experiments, simulate, simulate_batch};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 fn w2(integrator: Integrator, output_interval: Option<f64>) -> Experiment<3> {
-    let mut experiment = models::human_experiment(20.0, [0.0; 3]).expect("a sample experiment");
+    let mut experiment =
+        sample_experiments::human_experiment(20.0, [0.0; 3]).expect("a sample experiment");
     experiment.integrator = integrator;
     experiment.output_interval = output_interval;
     experiment
@@ -34,7 +35,7 @@ fn single(c: &mut Criterion) {
 
 /// 1000 runs with masses, viscosities and stiffnesses that differ, recorded at 50 Hz.
 fn w3(integrator: Integrator) -> Vec<Experiment<3>> {
-    let base = models::human_experiment(2.0, [0.0; 3]).expect("a sample experiment");
+    let base = sample_experiments::human_experiment(2.0, [0.0; 3]).expect("a sample experiment");
     (0..1000)
         .map(|i| {
             let scale = 1.0 + 1e-4 * f64::from(i);

@@ -1,9 +1,11 @@
 //! Kernels, steps and a session to count the instructions of: `counts WHAT HOW_MANY`; `scripts/counts.py` runs it.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Joints, Load, Pose, Scalar, forward_dynamics, inverse_dynamics, models as arms};
+use arm_core::{
+    Joints, Load, Pose, Scalar, forward_dynamics, inverse_dynamics, sample_arms as arms,
+};
 use arm_gap::data::prepared_session::PreparedSession;
-use arm_sim::{Experiment, Integrator, models, simulate};
+use arm_sim::{Experiment, Integrator, sample_experiments, simulate};
 use std::hint::black_box;
 
 #[path = "../../../crates/arm-gap/tests/suite/sessions.rs"]
@@ -69,7 +71,7 @@ fn gap(searches: u32) {
 /// The arm of table 4.10 led for some steps of 0.25 ms within a movement of 20 s.
 fn run(steps: u32, integrator: Integrator, further: &[Effect<f64>]) {
     let mut experiment: Experiment<3> =
-        models::human_experiment(20.0, [0.0; 3]).expect("a sample experiment");
+        sample_experiments::human_experiment(20.0, [0.0; 3]).expect("a sample experiment");
     experiment.integrator = integrator;
     experiment.duration = f64::from(steps) * experiment.dt;
     experiment.output_interval = Some(experiment.duration);

@@ -3,7 +3,7 @@
 //! asks for the digest.
 
 use arm_core::effect::{Effect, Kind};
-use arm_sim::{digest, models, simulate};
+use arm_sim::{digest, sample_experiments, simulate};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -19,7 +19,8 @@ fn main() {
         .next()
         .and_then(|text| text.parse::<f64>().ok())
         .expect("a smoothing [rad/s], 0 for friction that is set-valued");
-    let mut experiment = models::mechanical_experiment(2.0, [0.0; 2]).expect("a sample");
+    let mut experiment =
+        sample_experiments::mechanical_experiment(2.0, [0.0; 2]).expect("a sample");
     let values = [&values[..], &[smoothing]].concat();
     experiment.effects = (0..2)
         .map(|joint| Effect::new(kind, joint).with(&values))

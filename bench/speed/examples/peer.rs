@@ -5,10 +5,12 @@
 use arm_core::{
     Chain, Joints, Lanes, Load, Plane, Pose, Scalar, forward_dynamics, inverse_dynamics,
 };
-use arm_core::{Segment, models as arms};
+use arm_core::{Segment, sample_arms as arms};
 use arm_ident::cascade::quasi_static::{Cascade, Stream};
 use arm_ident::regression::trial::Model;
-use arm_sim::{Experiment, Integrator, models, simulate, simulate_accurately, simulate_batch};
+use arm_sim::{
+    Experiment, Integrator, sample_experiments, simulate, simulate_accurately, simulate_batch,
+};
 use cpu_time::ProcessTime;
 use std::hint::black_box;
 use std::io::{BufRead, Write};
@@ -274,7 +276,8 @@ fn load<T: Scalar, const N: usize>(torque: Joints<T, N>) -> Load<T, N> {
 }
 
 fn run(integrator: Integrator, duration: f64, interval: Option<f64>) -> Experiment<3> {
-    let mut experiment = models::human_experiment(duration, [0.0; 3]).expect("a sample experiment");
+    let mut experiment =
+        sample_experiments::human_experiment(duration, [0.0; 3]).expect("a sample experiment");
     experiment.integrator = integrator;
     experiment.output_interval = interval;
     experiment

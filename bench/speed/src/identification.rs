@@ -2,7 +2,7 @@
 
 use arm_core::effect::{Effect, Kind, MAX_STATES, Motion, resisting_torque};
 use arm_core::{
-    Chain, Contact, Joints, Plane, Pose, Segment, gravity, inverse_dynamics, jacobian, models,
+    Chain, Contact, Joints, Plane, Pose, Segment, gravity, inverse_dynamics, jacobian, sample_arms,
 };
 use arm_ident::inference::joint_method::{MotionSource, Options};
 use arm_ident::regression::trial::{Model, Tolerance, Trial};
@@ -13,7 +13,7 @@ const RATE: f64 = 100.0;
 
 /// The arm of table 4.10 as a laboratory would have it: every mass 8 % off, nothing known better than to 10 %.
 pub fn model(fitted: Vec<Effect<f64>>) -> Model<3> {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let segments: [Segment<f64>; 3] = core::array::from_fn(|k| Segment {
         mass: arm.segments()[k].mass * [1.08, 0.92, 1.08][k],
         ..arm.segments()[k]
@@ -29,7 +29,7 @@ pub fn model(fitted: Vec<Effect<f64>>) -> Model<3> {
 
 /// Angles and forces of a slow movement: there and back as in the reference workload, with noise. The force holds shoulder and elbow.
 pub fn slow(n: usize) -> (Vec<Joints<f64, 3>>, Vec<Plane<f64>>) {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let mut noise = || (rng.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
     (0..n)
@@ -51,7 +51,7 @@ pub fn slow(n: usize) -> (Vec<Joints<f64, 3>>, Vec<Plane<f64>>) {
 
 /// One trial with measured joint torques: sums of sines, viscosity and dry friction in every joint.
 fn fast(n: usize, effects: &[Effect<f64>]) -> Trial<3> {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut noise = || (rng.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
     let states = vec![[0.0; MAX_STATES]; effects.len()];

@@ -681,14 +681,14 @@ armrs_status armrs_compensation_carry(const struct armrs_compensation *compensat
                                       armrs_real torque[ARMRS_JOINTS],
                                       armrs_real sd[ARMRS_JOINTS]);
 
-// One control period; `sample` is null where one is missing. `heed`, if not null, says what became of it.
+// One control period; `sample` is null where one is missing. `sample_status`, if not null, says what became of it.
 //
 // # Safety
 // The pointers are null or point to what is said.
 ARMRS_MUST_USE
 armrs_status armrs_estimator_update(struct armrs_estimator *estimator,
                                     const struct armrs_sample *sample,
-                                    armrs_sample_status *heed);
+                                    armrs_sample_status *sample_status);
 
 // What is known of an unknown: first moments of the joints, second moments, then the linear parameters of the effects.
 //

@@ -2,11 +2,11 @@
 
 use core::ffi::{CStr, c_char};
 
+use arm_capi_online::armrs_status::{self, *};
+use arm_capi_online::call::{ended, given, numbers, place};
+use arm_capi_online::held::Held;
 use arm_core::effect::{ActsOn, Effect, KINDS, MAX_STATES, applied};
 use arm_core::{Chain, Equation, Segment};
-use arm_period::armrs_status::{self, *};
-use arm_period::call::{ended, given, numbers, place};
-use arm_period::held::Held;
 
 use crate::refusal::{Refusal, armrs_problem, status_of};
 use crate::{ARMRS_EFFECTS, ARMRS_JOINTS, Kept, armrs_arm, armrs_real};

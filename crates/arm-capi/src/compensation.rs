@@ -1,9 +1,9 @@
 //! Makes the torque that carries an arm that was identified elsewhere.
 
+use arm_capi_online::armrs_status;
+use arm_capi_online::call::{given, numbers, place};
+use arm_capi_online::held::Held;
 use arm_core::Compensation;
-use arm_period::armrs_status;
-use arm_period::call::{given, numbers, place};
-use arm_period::held::Held;
 
 use crate::refusal::{armrs_problem, status_of};
 use crate::{ARMRS_UNKNOWNS, armrs_arm, armrs_compensation, armrs_real};

@@ -1,9 +1,9 @@
 //! Makes estimators.
 
+use arm_capi_online::armrs_status;
+use arm_capi_online::call::{ended, given, place};
+use arm_capi_online::held::Held;
 use arm_core::estimator::{Estimator, Settings};
-use arm_period::armrs_status;
-use arm_period::call::{ended, given, place};
-use arm_period::held::Held;
 
 use crate::refusal::{armrs_problem, status_of};
 use crate::{ARMRS_JOINTS, armrs_arm, armrs_estimator, armrs_real};

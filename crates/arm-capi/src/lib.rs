@@ -15,7 +15,7 @@ mod robot;
 mod seal;
 
 pub use arm::*;
-pub use arm_period::*;
+pub use arm_capi_online::*;
 pub use compensation::*;
 pub use estimator::*;
 pub use monitor::*;

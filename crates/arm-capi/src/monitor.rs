@@ -1,9 +1,9 @@
 //! Makes safety monitors.
 
-use arm_core::monitor::{Channel, Monitor, Quantity, Times};
-use arm_period::armrs_status::{self, *};
-use arm_period::call::{given, place};
-use arm_period::held::Held;
+use arm_capi_online::armrs_status::{self, *};
+use arm_capi_online::call::{given, place};
+use arm_capi_online::held::Held;
+use arm_core::monitor::{Monitor, MonitoredChannel, Quantity, Times};
 
 use crate::refusal::{Refusal, armrs_problem, status_of};
 use crate::{ARMRS_CHANNELS, armrs_monitor, armrs_real};
@@ -65,7 +65,7 @@ pub unsafe extern "C" fn armrs_monitor_init(
             let refusal = Refusal::named(ARMRS_OUT_OF_RANGE, ["number of channels", ""], 0);
             return Err(refusal.numbers(limits));
         }
-        let open = Channel::magnitude(Quantity::Force, armrs_real::INFINITY);
+        let open = MonitoredChannel::magnitude(Quantity::Force, armrs_real::INFINITY);
         let mut kept = [open; ARMRS_CHANNELS];
         for (i, channel) in kept.iter_mut().take(count).enumerate() {
             // SAFETY: there are `count` channels.
@@ -77,7 +77,7 @@ pub unsafe extern "C" fn armrs_monitor_init(
                     change
                 }
             };
-            *channel = Channel::range(quantity(given.quantity, i)?, given.min, given.max)
+            *channel = MonitoredChannel::range(quantity(given.quantity, i)?, given.min, given.max)
                 .fastest(any(given.fastest))
                 .farthest(any(given.farthest));
             channel.frozen_after = (given.frozen_after > 0).then_some(given.frozen_after);

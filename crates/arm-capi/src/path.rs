@@ -1,9 +1,9 @@
 //! Makes paths through waypoints.
 
+use arm_capi_online::armrs_status::{self, *};
+use arm_capi_online::call::{finite, given, joints, numbers, place};
+use arm_capi_online::held::Held;
 use arm_core::{Limits, Path, Route, Shape};
-use arm_period::armrs_status::{self, *};
-use arm_period::call::{finite, given, joints, numbers, place};
-use arm_period::held::Held;
 
 use crate::refusal::{Refusal, armrs_problem, status_of};
 use crate::{ARMRS_JOINTS, ARMRS_WAYPOINTS, armrs_path, armrs_real};

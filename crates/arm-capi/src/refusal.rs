@@ -2,8 +2,8 @@
 
 use core::ffi::c_char;
 
+use arm_capi_online::armrs_status::{self, *};
 use arm_core::Invalid;
-use arm_period::armrs_status::{self, *};
 
 use crate::armrs_real;
 

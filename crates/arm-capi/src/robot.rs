@@ -1,9 +1,9 @@
 //! Makes the two-link robot that leads the hand.
 
+use arm_capi_online::armrs_status;
+use arm_capi_online::call::{numbers, place};
+use arm_capi_online::held::Held;
 use arm_core::{Elbow, Robot};
-use arm_period::armrs_status;
-use arm_period::call::{numbers, place};
-use arm_period::held::Held;
 
 use crate::refusal::{armrs_problem, status_of};
 use crate::{armrs_real, armrs_robot};

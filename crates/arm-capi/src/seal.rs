@@ -2,8 +2,8 @@
 
 use core::ffi::c_void;
 
-use arm_period::armrs_status::{self, ARMRS_CORRUPT, ARMRS_NULL};
-use arm_period::call::{ended, place};
+use arm_capi_online::armrs_status::{self, ARMRS_CORRUPT, ARMRS_NULL};
+use arm_capi_online::call::{ended, place};
 
 /// Seals memory with its CRC-32 (IEEE 802.3): an arm or a compensation once it is made, an estimator before it is saved. Five
 /// instructions for each bit of it, about 40 for each byte: not for every period.

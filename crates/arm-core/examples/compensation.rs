@@ -1,10 +1,10 @@
 //! The torque that carries an arm whose first moments are known to 3 %, with its standard deviation.
 
 use arm_core::effect::Motion;
-use arm_core::{Compensation, Equation, Invalid, Joints, models};
+use arm_core::{Compensation, Equation, Invalid, Joints, sample_arms};
 
 fn main() -> Result<(), Invalid> {
-    let arm = Equation::<f64, 3, 6, 0>::new(models::human_arm(), [])?;
+    let arm = Equation::<f64, 3, 6, 0>::new(sample_arms::human_arm(), [])?;
     let values = arm.priors(0.05).map(|p| p.mean);
     let mut covariance = [[0.0; 6]; 6];
     for i in 0..3 {

@@ -2,11 +2,11 @@
 
 use arm_core::effect::Motion;
 use arm_core::estimator::{Estimator, Sample, Settings};
-use arm_core::{Equation, Invalid, Joints, Measured, models};
+use arm_core::{Equation, Invalid, Joints, Measured, sample_arms};
 
 fn main() -> Result<(), Invalid> {
     // Two segments, no effects: four unknowns.
-    let arm = Equation::<f64, 2, 4, 0>::new(models::mechanical_arm(), [])?;
+    let arm = Equation::<f64, 2, 4, 0>::new(sample_arms::mechanical_arm(), [])?;
     let mut priors = arm.priors(0.1);
     for prior in &mut priors {
         prior.mean *= 1.08;

@@ -1,10 +1,10 @@
 //! A monitor of one angle: it stops at the first value that is not allowed, and stays stopped.
 
 use arm_core::Invalid;
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Times};
+use arm_core::monitor::{Monitor, MonitoredChannel, Observation, Quantity, Times};
 
 fn main() -> Result<(), Invalid> {
-    let angle = Channel::range(Quantity::Angle, -1.5, 0.5)
+    let angle = MonitoredChannel::range(Quantity::Angle, -1.5, 0.5)
         .fastest(5.0)
         .frozen_after(50_000);
     let times = Times {

@@ -1,6 +1,6 @@
 //! Checks of values handed to the core.
 
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 use crate::{Invalid, Scalar};
 
 pub(crate) fn finite<T: Scalar>(name: &'static str, index: usize, value: T) -> Result<(), Invalid> {

@@ -11,8 +11,8 @@
 //! link in absolute angles, which needs few operations and separates the base parameters.
 //!
 //! ```
-//! use arm_core::{models, gravity, Pose};
-//! let arm = models::mechanical_arm();
+//! use arm_core::{sample_arms, gravity, Pose};
+//! let arm = sample_arms::mechanical_arm();
 //! let torque = gravity(&arm, &Pose::new(&[0.0, 0.0].into()));
 //! assert!((torque[1] - 9.81 * 1.160 * 0.115).abs() < 1e-12);
 //! ```
@@ -22,65 +22,45 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub mod anthropometry;
-mod body;
-mod calibration;
-mod chain;
+mod arm;
 mod check;
-mod compensation;
-mod contact;
-mod contribution;
-mod coriolis;
-mod covariance;
+mod control;
 mod dynamics;
 pub mod effect;
-mod energy;
-mod equation;
 mod error;
 pub mod estimator;
-mod float;
-mod gravity;
-mod inertia;
-mod kinematics;
-mod lanes;
-pub mod models;
-pub mod monitor;
-mod placement;
-mod products;
-mod regressor;
-mod robot;
-mod scalar;
-mod series;
-mod setup;
-#[cfg(feature = "simd")]
-pub mod simd_dispatch;
-mod trajectory;
-mod unroll;
+mod numeric;
+mod regression;
+mod rig;
 
-pub use body::{Body, Orthosis};
-pub use calibration::Calibration;
-pub use chain::{Chain, Segment};
-pub use compensation::{Compensation, GravityCompensation};
-pub use contact::Contact;
-pub use contribution::{Contributions, contributions};
-pub use coriolis::{centrifugal, coriolis, coriolis_matrix};
-pub use dynamics::{
+pub use arm::body::{Body, Orthosis};
+pub use arm::chain::{Chain, Segment};
+pub use arm::{anthropometry, sample_arms};
+pub use control::calibration::Calibration;
+pub use control::gravity_compensation::{Compensation, GravityCompensation};
+pub use control::monitor;
+pub use control::trajectory::{Limits, Path, Profile, Route, Sample, Shape};
+pub use dynamics::contributions::{Contributions, contributions};
+pub use dynamics::coriolis::{centrifugal, coriolis, coriolis_matrix};
+pub use dynamics::energy::{kinetic_energy, potential_energy};
+pub use dynamics::gravity::gravity;
+pub use dynamics::inertia::{inertia, link_inertia};
+pub use dynamics::inverse_and_forward::{
     Load, Resistance, accelerations, forward_dynamics, inverse_dynamics, joint_force, static_torque,
 };
-pub use energy::{kinetic_energy, potential_energy};
-pub use equation::{Equation, Measured, Needed, Prior};
+pub use dynamics::kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};
+pub use dynamics::products::Products;
+pub use dynamics::regressor::{Regressor, regressor};
 pub use error::{Invalid, Shown};
-pub use gravity::gravity;
-pub use inertia::{inertia, link_inertia};
-pub use kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};
-pub use lanes::Lanes;
-pub use placement::Placement;
-pub use products::Products;
-pub use regressor::{Regressor, regressor};
-pub use robot::{Elbow, Robot};
-pub use scalar::{Real, Scalar};
-pub use setup::{Displaced, Reading, Setup, Wave};
-pub use trajectory::{Limits, Path, Profile, Route, Sample, Shape};
+pub use numeric::lanes::Lanes;
+pub use numeric::scalar::{Real, Scalar};
+#[cfg(feature = "simd")]
+pub use numeric::simd_dispatch;
+pub use regression::{Equation, Measured, Needed, Prior};
+pub use rig::contact::Contact;
+pub use rig::placement::Placement;
+pub use rig::robot::{Elbow, Robot};
+pub use rig::setup::{Displaced, Reading, Setup, Wave};
 
 /// A value for each joint or link: angles, speeds, torques.
 pub type Joints<T, const N: usize> = nalgebra::SVector<T, N>;

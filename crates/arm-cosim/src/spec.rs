@@ -1,7 +1,7 @@
 //! The arm as it travels: with everything that the simulation of it needs and nothing else.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place};
-use arm_core::{Chain, Contact, Invalid, Joints, Segment, Setup, models};
+use arm_core::{Chain, Contact, Invalid, Joints, Segment, Setup, sample_arms};
 use arm_sim::{Port, SimulationError};
 use serde::{Deserialize, Serialize};
 
@@ -78,7 +78,7 @@ pub struct StartSpec {
 impl ArmSpec {
     /// The mechanical arm of thesis table 4.9 behind its force port, at (−60, 50)°.
     pub fn sample() -> Self {
-        let arm = models::mechanical_arm();
+        let arm = sample_arms::mechanical_arm();
         let effect = |index, torque| Effect::new(Kind::Coulomb, index).with(&[torque]);
         let setup = Setup::new(&arm, Contact::new([10_000.0; 2], [25.0; 2]));
         let q = [-60.0, 50.0].map(f64::to_radians).to_vec();

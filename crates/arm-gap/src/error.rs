@@ -1,4 +1,4 @@
-//! Why a search could not be made.
+//! Errors of a search.
 
 use arm_ident::IdentError;
 use arm_sim::SimulationError;

@@ -8,7 +8,7 @@
 //! kg m. Synthetic data, seeds 1 … repetitions.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Chain, Contact, Joints, Limits, Segment, Setup, Shape, models};
+use arm_core::{Chain, Contact, Joints, Limits, Segment, Setup, Shape, sample_arms};
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::regression::trial::{Model, Tolerance, Trial};
 use arm_sim::{Coupling, Drive, Experiment, HandlePath, Movement, Recording, Start, simulate};
@@ -59,7 +59,7 @@ fn contact() -> Contact<f64> {
 
 /// The experiment without noise.
 fn led(torque: [f64; 2]) -> Recording<2> {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let waypoints: Vec<Joints<f64, 2>> = [[-40.0_f64, 60.0], [-28.6, 71.5], [-40.0, 60.0]]
         .map(|w| Joints::from(w.map(f64::to_radians)))
         .to_vec();
@@ -85,7 +85,7 @@ fn led(torque: [f64; 2]) -> Recording<2> {
 fn assumed() -> Model<2> {
     let scale = [1.1, 0.9];
     let segments = core::array::from_fn(|j| {
-        let s: Segment<f64> = models::mechanical_arm().segments()[j];
+        let s: Segment<f64> = sample_arms::mechanical_arm().segments()[j];
         Segment {
             mass: s.mass * scale[j],
             com: [s.com[0] * scale[1 - j], 0.0],
@@ -149,7 +149,7 @@ fn main() {
     let exact = arguments.get(3).is_none_or(|a| a == "exact");
 
     let torque = if braked { BRAKES } else { [0.0; 2] };
-    let [first, second] = *models::mechanical_arm().first_moments();
+    let [first, second] = *sample_arms::mechanical_arm().first_moments();
     let truth = [first, second, torque[0], torque[1]];
     let options = Options {
         tolerance: tolerance(exact),

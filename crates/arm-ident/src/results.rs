@@ -123,12 +123,12 @@ impl Identification {
     /// [`Refused`] where an estimate is none that a model may have.
     pub fn of<const N: usize>(
         result: &estimate::Identified<N>,
-        asked: &IdentificationInput<'_>,
+        input: &IdentificationInput<'_>,
     ) -> Result<Self, Refused> {
         let not_simulated = result.not_simulated.as_ref();
-        let trials: Vec<_> = result.explained.iter().zip(asked.trials).collect();
+        let trials: Vec<_> = result.explained.iter().zip(input.trials).collect();
         Ok(Self {
-            method: asked.method.to_owned(),
+            method: input.method.to_owned(),
             status: result.status.name().to_owned(),
             rank: result.rank,
             unknowns: result.unknowns,
@@ -142,15 +142,15 @@ impl Identification {
             left_out: Vec::new(),
             trades: result.trades.clone(),
             scale_free: result.scale_free,
-            level: asked.level,
+            level: input.level,
             cutoff: result.cutoff,
             residual_rms: by_role(&trials),
             residual_rms_by_configuration: by_configuration(&trials),
             neglected_inertia: result.neglected_inertia.clone(),
             speed_noise: result.speed_noise.clone(),
             not_simulated: not_simulated.map(ToString::to_string),
-            sticks: sticking_anew(&result.fitted, asked.effects),
-            model: identified_model(&result.chain, &result.fitted, asked)?,
+            sticks: sticking_anew(&result.fitted, input.effects),
+            model: identified_model(&result.chain, &result.fitted, input)?,
             explained: result
                 .explained
                 .iter()
@@ -221,12 +221,12 @@ const ROUNDING: f64 = 1e-12;
 fn identified_model<const N: usize>(
     chain: &Chain<f64, N>,
     fitted: &[CoreEffect<f64>],
-    asked: &IdentificationInput<'_>,
+    input: &IdentificationInput<'_>,
 ) -> Result<Model, Refused> {
-    let model = asked.model;
+    let model = input.model;
     let fitted: Vec<Effect> = fitted.iter().map(Effect::from_core).collect();
     // Effects of segments and of the hand are contained in the segments now.
-    let held = asked.effects.iter().filter(|e| {
+    let held = input.effects.iter().filter(|e| {
         let place = e.kind.info().place;
         !matches!(place, Place::Joint | Place::Segment | Place::Hand)
     });
@@ -305,7 +305,7 @@ mod tests {
 
     /// Residuals of 3 and 4 N m in one trial to fit, 1 N m in the other, and none where no sample was used.
     #[test]
-    fn residuals_are_told_by_role_and_movement() {
+    fn residuals_are_listed_by_role_and_movement() {
         let name = |role, configuration: &str| TrialName {
             role,
             configuration: configuration.to_owned(),

@@ -7,7 +7,7 @@ use crate::{Refused, Table, Value, kind, kinds, unknown};
 
 /// A channel of the force sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Channel {
+pub enum ForceChannel {
     /// Force along y.
     Fy,
     /// Force along z.
@@ -16,7 +16,7 @@ pub enum Channel {
     Mx,
 }
 
-impl Channel {
+impl ForceChannel {
     /// All channels, in the order of the core.
     pub const ALL: [Self; 3] = [Self::Fy, Self::Fz, Self::Mx];
     const NAMED: [(&'static str, Self); 3] = [("Fy", Self::Fy), ("Fz", Self::Fz), ("Mx", Self::Mx)];
@@ -39,7 +39,7 @@ pub enum Site {
     /// A joint, or for an effect on segments a segment; from 0.
     Joint(usize),
     /// A channel of the force sensor.
-    Channel(Channel),
+    Channel(ForceChannel),
 }
 
 impl Site {
@@ -56,7 +56,7 @@ impl Site {
     pub fn of(kind: Kind, index: usize) -> Self {
         match kind.info().place.address() {
             Some("joint") => Self::Joint(index),
-            Some(_) => Self::Channel(Channel::ALL[index.min(2)]),
+            Some(_) => Self::Channel(ForceChannel::ALL[index.min(2)]),
             None => Self::Whole,
         }
     }
@@ -151,7 +151,7 @@ impl Effect {
         }
     }
     /// The channel it acts on.
-    pub fn channel(&self) -> Option<Channel> {
+    pub fn channel(&self) -> Option<ForceChannel> {
         match self.site {
             Site::Channel(channel) => Some(channel),
             _ => None,
@@ -243,7 +243,7 @@ impl Effect {
         site.push("channel", channel);
         let mut site = Fields::new("", Value::Table(site))?;
         let joint = site.whole("joint", 1)?;
-        let channel = site.choice("channel", &Channel::NAMED)?;
+        let channel = site.choice("channel", &ForceChannel::NAMED)?;
         let mut effect = Self {
             kind,
             site: Site::Whole,
@@ -290,7 +290,7 @@ impl Effect {
     pub fn to_table(&self) -> Table {
         let mut table = Table::new().with("kind", self.name());
         table.push("joint", self.joint().map(|joint| joint as i64 + 1));
-        table.push("channel", self.channel().map(Channel::name));
+        table.push("channel", self.channel().map(ForceChannel::name));
         for (name, value) in self.parameters() {
             table.push(name, value);
         }

@@ -1,6 +1,6 @@
 use crate::number::rounded;
 use crate::refused::join;
-use crate::{Refused, Table, Value, unknown};
+use crate::{RefusalKind, Refused, Table, Value, unknown};
 
 /// What a number may be.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -196,7 +196,7 @@ impl Fields {
             return Ok(());
         }
         let allowed = format!("key {key} is required");
-        Err(Refused::new(self.at(key), "nothing", allowed))
+        Err(Refused::new(self.at(key), "nothing", allowed).of_kind(RefusalKind::MissingKey))
     }
 
     pub(crate) fn at(&self, key: &str) -> String {

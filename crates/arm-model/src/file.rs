@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use crate::Refused;
+use crate::{RefusalKind, Refused};
 
 /// Largest file that is read \[byte\]; a model takes some hundred.
 const MAX_SIZE: u64 = 16 * 1024 * 1024;
@@ -19,10 +19,14 @@ pub(crate) fn read(path: &Path, what: &str) -> Result<String, Refused> {
 fn raw(path: &Path, what: &str) -> Result<Vec<u8>, Refused> {
     let unreadable = |error: std::io::Error| match error.kind() {
         ErrorKind::InvalidInput => Refused::new("file", "a name no file can have", what),
-        _ => {
+        kind => {
             let text = error.to_string();
             let reason = text.split(" (os error").next().unwrap_or("unreadable");
-            Refused::new("file", reason, format!("{what} that can be read"))
+            let refused = Refused::new("file", reason, format!("{what} that can be read"));
+            match kind {
+                ErrorKind::NotFound => refused.of_kind(RefusalKind::MissingFile),
+                _ => refused,
+            }
         }
     };
     let kind = fs::metadata(path).map_err(unreadable)?;

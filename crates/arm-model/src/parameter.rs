@@ -5,7 +5,7 @@ use arm_core::effect::{Kind, Place};
 
 use crate::fields::Bounds;
 use crate::{
-    Channel, Contact, Effect, Joint, Model, Parts, Refused, Robot, Segment, Site, Value, kind,
+    Contact, Effect, ForceChannel, Joint, Model, Parts, Refused, Robot, Segment, Site, Value, kind,
     kinds, unknown,
 };
 
@@ -25,7 +25,7 @@ pub enum Object {
     /// The robot.
     Robot,
     /// A channel of the force sensor.
-    Channel(Channel),
+    Channel(ForceChannel),
     /// All channels of the sensors together.
     Sensors,
 }
@@ -299,7 +299,9 @@ impl FromStr for ParameterId {
             ("sensors", None) => Object::Sensors,
             ("segment", at) => Object::Segment(position(at).ok_or_else(malformed)?),
             ("joint", at) => Object::Joint(position(at).ok_or_else(malformed)?),
-            ("channel", Some(name)) => Object::Channel(Channel::named(name).ok_or_else(malformed)?),
+            ("channel", Some(name)) => {
+                Object::Channel(ForceChannel::named(name).ok_or_else(malformed)?)
+            }
             (name, _) => {
                 let known = [
                     "arm", "segment", "joint", "hand", "contact", "robot", "channel", "sensors",

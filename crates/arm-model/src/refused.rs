@@ -3,11 +3,37 @@ use std::path::Path;
 
 use crate::number::{quoted, shortened};
 
+/// In which way an input cannot be used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RefusalKind {
+    /// A value that is not allowed.
+    #[default]
+    Value,
+    /// A required key is missing.
+    MissingKey,
+    /// A file does not exist.
+    MissingFile,
+}
+
+impl RefusalKind {
+    /// Its name in Python.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Value => "value",
+            Self::MissingKey => "missing_key",
+            Self::MissingFile => "missing_file",
+        }
+    }
+}
+
 /// An input that cannot be used: where, what was found and what is allowed, on one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refused {
+    /// In which way it cannot be used.
+    pub kind: RefusalKind,
     /// The file, as the caller named it.
-    pub file: Option<String>,
+    pub file: Option<Box<str>>,
     /// Table and key, or the name of an argument; empty for the whole.
     pub place: String,
     /// What was found there.
@@ -26,12 +52,20 @@ impl Refused {
         allowed: impl Into<String>,
     ) -> Self {
         Self {
+            kind: RefusalKind::Value,
             file: None,
             place: place.into(),
             found: found.into(),
             allowed: allowed.into(),
             hint: None,
         }
+    }
+
+    /// The same of another kind.
+    #[must_use]
+    pub fn of_kind(mut self, kind: RefusalKind) -> Self {
+        self.kind = kind;
+        self
     }
 
     /// The same with what was probably meant.
@@ -52,7 +86,7 @@ impl Refused {
     #[must_use]
     pub fn in_file(mut self, file: &Path) -> Self {
         self.file
-            .get_or_insert_with(|| file.to_string_lossy().into_owned());
+            .get_or_insert_with(|| file.to_string_lossy().into());
         self
     }
 }

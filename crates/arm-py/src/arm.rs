@@ -5,9 +5,9 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::convert::{Numbers, Rows, over_rows};
+use crate::arrays::{Numbers, Rows, over_rows};
 use crate::errors::{bad_input, invalid};
-use crate::kernel::{self, MOST};
+use crate::row_kernels::{self, MOST};
 
 /// A chain whose length is known at run time.
 #[derive(Clone, Debug)]
@@ -270,32 +270,32 @@ impl Arm {
     /// Position of the tip, shape (2,) or (n_samples, 2) [m].
     fn forward_kinematics<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
         let rows = [Rows::new("q", &q, self.n_joints())?];
-        each_length!(&self.chain, c => over_rows(py, kernel::ForwardKinematics, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::ForwardKinematics, c, rows))
     }
 
     /// Derivative of the tip position to the joint angles, shape (2, n_joints) or (n_samples, 2, n_joints) [m/rad].
     fn jacobian<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
         let rows = [Rows::new("q", &q, self.n_joints())?];
-        each_length!(&self.chain, c => over_rows(py, kernel::Jacobian, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::Jacobian, c, rows))
     }
 
     /// Inertia matrix B(q), shape (n_joints, n_joints), with the batch in front [kg m²].
     fn inertia<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
         let rows = [Rows::new("q", &q, self.n_joints())?];
-        each_length!(&self.chain, c => over_rows(py, kernel::Inertia, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::Inertia, c, rows))
     }
 
     /// Coriolis and centrifugal torques C(q, q̇) q̇, shape of `q` [N m].
     fn coriolis<'py>(&self, py: Python<'py>, q: Numbers<'py>, qd: Numbers<'py>) -> Array<'py> {
         let n = self.n_joints();
         let rows = [Rows::new("q", &q, n)?, Rows::new("qd", &qd, n)?];
-        each_length!(&self.chain, c => over_rows(py, kernel::Coriolis, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::Coriolis, c, rows))
     }
 
     /// Gravity torques G(q), shape of `q` [N m].
     fn gravity<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
         let rows = [Rows::new("q", &q, self.n_joints())?];
-        each_length!(&self.chain, c => over_rows(py, kernel::Gravity, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::Gravity, c, rows))
     }
 
     /// Joint torques of a force on the arm at its tip, Jᵀ F, shape of `q` [N m].
@@ -311,7 +311,7 @@ impl Arm {
             Rows::new("q", &q, self.n_joints())?,
             Rows::new("force_on_arm", &force_on_arm, 2)?,
         ];
-        each_length!(&self.chain, c => over_rows(py, kernel::StaticTorque, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::StaticTorque, c, rows))
     }
 
     /// Joint torques of a motion of the rigid arm, B q̈ + C q̇ + G, shape of `q` [N m].
@@ -323,7 +323,7 @@ impl Arm {
         qdd: Numbers<'py>,
     ) -> Array<'py> {
         let rows = self.rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
-        each_length!(&self.chain, c => over_rows(py, kernel::InverseDynamics, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::InverseDynamics, c, rows))
     }
 
     /// Joint accelerations under joint torques, the inverse of `inverse_dynamics`, shape of `q` [rad/s²].
@@ -335,7 +335,7 @@ impl Arm {
         tau: Numbers<'py>,
     ) -> Array<'py> {
         let rows = self.rows([("q", &q), ("qd", &qd), ("tau", &tau)])?;
-        each_length!(&self.chain, c => over_rows(py, kernel::ForwardDynamics, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::ForwardDynamics, c, rows))
     }
 
     /// The regressor of the base parameters, shape (n_joints, 3·n_joints) with the batch in front.
@@ -350,6 +350,6 @@ impl Arm {
         qdd: Numbers<'py>,
     ) -> Array<'py> {
         let rows = self.rows([("q", &q), ("qd", &qd), ("qdd", &qdd)])?;
-        each_length!(&self.chain, c => over_rows(py, kernel::Regressor, c, rows))
+        each_length!(&self.chain, c => over_rows(py, row_kernels::Regressor, c, rows))
     }
 }

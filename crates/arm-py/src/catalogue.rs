@@ -13,7 +13,7 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     )
 }
 
-/// All kinds of effects, those of one's own last: name, title, where, parameters with units and bounds, formula, reference.
+/// All kinds of effects, user-defined ones last: name, title, where, parameters with units and bounds, formula, reference.
 #[pyfunction]
 pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     let list = PyList::empty(py);
@@ -49,7 +49,7 @@ pub fn effects(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
         entry.set_item("feels_activity", kind.feels_activity())?;
         entry.set_item("searched", !kind.prior().parts.is_empty())?;
         entry.set_item("address", info.place.address())?;
-        entry.set_item("own", matches!(kind, Kind::Own(_)))?;
+        entry.set_item("own", matches!(kind, Kind::Custom(_)))?;
         list.append(entry)?;
     }
     Ok(list)

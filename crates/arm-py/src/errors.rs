@@ -28,8 +28,9 @@ pub fn refused(error: arm_model::Refused) -> PyErr {
         let made = py.import("armrs.errors").and_then(|errors| {
             let text = errors.getattr("Text")?.call1((error.found,))?;
             let named = pyo3::types::PyDict::new(py);
-            named.set_item("file", error.file)?;
+            named.set_item("file", error.file.as_deref())?;
             named.set_item("hint", error.hint)?;
+            named.set_item("kind", error.kind.name())?;
             let class = errors.getattr("BadInput")?;
             class.call((error.place, text, error.allowed), Some(&named))
         });

@@ -7,8 +7,8 @@ use pyo3::types::PyDict;
 
 use crate::arm::AnyChain;
 use crate::errors::{bad_input, invalid};
-use crate::kernel::joints;
 use crate::rig::Rig;
+use crate::row_kernels::joints;
 
 /// Most effects and unknowns of the C interface.
 pub const EFFECTS: usize = 12;
@@ -89,7 +89,7 @@ pub fn device<T: Real, const N: usize>(
     chain: &Chain<f64, N>,
     effects: &[Effect<f64>],
 ) -> PyResult<(DeviceEquation<T, N>, Calibration<f64, N>)> {
-    if let Some(own) = effects.iter().find(|e| matches!(e.kind, Kind::Own(_))) {
+    if let Some(own) = effects.iter().find(|e| matches!(e.kind, Kind::Custom(_))) {
         return Err(refused((
             0,
             Invalid::CannotAct {

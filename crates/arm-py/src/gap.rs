@@ -15,10 +15,10 @@ use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, each_short_length};
+use crate::custom_effects;
 use crate::errors::{bad_input, gap, refused};
-use crate::ident::{Columns, read_trials};
+use crate::identification::{Columns, read_trials};
 use crate::model;
-use crate::own;
 use crate::results::{Alternative, GapResult, Screening, SimulatedTrial};
 use crate::rig::Rig;
 
@@ -73,7 +73,7 @@ impl<'a, 'py> Call<'a, 'py> {
             own: settings
                 .own
                 .iter()
-                .map(|kind| own::kind(kind))
+                .map(|kind| custom_effects::kind(kind))
                 .collect::<PyResult<_>>()?,
             base: Vec::new(),
             start: [[0.0; 3]; N],
@@ -88,7 +88,7 @@ impl<'a, 'py> Call<'a, 'py> {
         self.trials.iter().map(file).collect()
     }
 
-    fn asked<'s>(&'s self, trials: &'s [TrialFile]) -> SearchInput<'s> {
+    fn input<'s>(&'s self, trials: &'s [TrialFile]) -> SearchInput<'s> {
         SearchInput {
             model: self.settings.model.get().inner(),
             force_on_robot: self.settings.force_on_robot,
@@ -109,7 +109,7 @@ impl<'a, 'py> Call<'a, 'py> {
             let found = work(&mut prepared)?;
             Ok((prepared, found))
         });
-        own::failed()?;
+        custom_effects::failed()?;
         outcome.map_err(gap)
     }
 }
@@ -139,18 +139,18 @@ pub fn play(
         let one = |i: usize| {
             let course = Arc::new(session.course(i)?);
             // A trial that cannot be simulated is reported below.
-            let believed = match own {
+            let own_or_given = match own {
                 true => session.in_trial((&given, &[]), &course).ok(),
                 false => None,
             };
             let mut trial = core::SimulatedTrial::measured(&session, (i, files[i]), &course);
-            let believed = believed.as_ref().unwrap_or(&given);
-            trial.shown[Version::Given as usize] = session.shown_in(believed, &course).ok();
+            let hypothesis = own_or_given.as_ref().unwrap_or(&given);
+            trial.shown[Version::Given as usize] = session.shown_in(hypothesis, &course).ok();
             Ok(trial)
         };
         let threads = call.settings.threads;
         let plays = py.detach(|| parallel(threads, files.len(), one));
-        own::failed()?;
+        custom_effects::failed()?;
         let made = |play: Result<core::SimulatedTrial, GapError>| {
             play.map(|trial| SimulatedTrial(trial.into())).map_err(gap)
         };
@@ -192,8 +192,8 @@ pub fn find_gap(
         let done = call.studied(py, &session, |s| s.search(&|w, s| callback.tell(w, s)));
         let (prepared, finding) = callback.or_raised(done)?;
         let files = call.files();
-        let asked = call.asked(&files);
-        py.detach(|| core::GapResult::of(&prepared, &finding, &asked))
+        let input = call.input(&files);
+        py.detach(|| core::GapResult::of(&prepared, &finding, &input))
             .map(GapResult)
             .map_err(refused)
     }
@@ -222,8 +222,8 @@ pub fn look(
         let done = call.studied(py, &session, |s| s.look(&|w, s| callback.tell(w, s)));
         let (prepared, look) = callback.or_raised(done)?;
         let files = call.files();
-        let asked = call.asked(&files);
-        py.detach(|| core::Screening::of(&prepared, &look, &asked))
+        let input = call.input(&files);
+        py.detach(|| core::Screening::of(&prepared, &look, &input))
             .map(Screening)
             .map_err(refused)
     }
@@ -327,7 +327,7 @@ pub fn distances(
             found.extend(each);
             Ok(found)
         });
-        own::failed()?;
+        custom_effects::failed()?;
         outcome.map_err(gap)
     }
     let rivals = rivals

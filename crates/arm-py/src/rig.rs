@@ -6,10 +6,11 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arm::{AnyChain, Arm, each_length};
-use crate::convert::{Numbers, in_order};
+use crate::arrays::{Numbers, in_order};
+use crate::custom_effects;
 use crate::errors::invalid;
-use crate::kernel::joints;
-use crate::{model, own};
+use crate::model;
+use crate::row_kernels::joints;
 
 /// A model as the core computes with it: the arm, its effects, its contact with the robot and the robot itself.
 ///
@@ -82,7 +83,7 @@ impl Rig {
             let torques = in_order(py, rows, self.effects.len(), |[q, qd, qdd], out| {
                 along.next(&joints(q), &joints(qd), &joints(qdd), out);
             })?;
-            own::failed()?;
+            custom_effects::failed()?;
             Ok(torques)
         })
     }

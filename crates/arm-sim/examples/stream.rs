@@ -7,10 +7,10 @@
 use std::f64::consts::TAU;
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Contact, Joints, Limits, Setup, Shape, models};
+use arm_core::{Contact, Joints, Limits, Setup, Shape, sample_arms};
 use arm_sim::{
-    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start, models as rigs,
-    simulate,
+    Coupling, Drive, Experiment, HandlePath, Movement, SensorChannel, Sensors, Start,
+    sample_experiments as rigs, simulate,
 };
 
 /// Where the arm is led [°]; `firmware/main.c` has the same.
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let file = std::env::args()
         .nth(1)
         .ok_or("the file to write is missing")?;
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let waypoints = WAYPOINTS.map(|q| Joints::from(q.map(f64::to_radians)));
     let limits = [Limits {
         speed: 0.6,
@@ -62,15 +62,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut sensors = Sensors::ideal();
     sensors.rate = 1000.0;
     sensors.seed = 7;
-    sensors.angle = [Channel {
+    sensors.angle = [SensorChannel {
         range: TAU / 2.0,
         bits: Some(20),
-        ..Channel::white(5e-6)
+        ..SensorChannel::white(5e-6)
     }; 3];
-    sensors.force = [Channel {
+    sensors.force = [SensorChannel {
         range: 110.0,
         bits: Some(12),
-        ..Channel::white(0.1)
+        ..SensorChannel::white(0.1)
     }; 2];
     let read = sensors.read(&experiment, &recording)?;
     let mut bytes = Vec::new();

@@ -3,29 +3,33 @@
 //! `cargo run --release -p arm-sim --example supervisor -- 1000`
 
 use arm_core::Shape;
-use arm_sim::{Controller, Experiment, Fault, Safety, SimulationError, control, models};
+use arm_sim::{
+    Controller, Experiment, InjectedFault, Safety, SimulationError, control, sample_experiments,
+};
 
 /// Movements of different reach and speed, of arms with two and three segments in turn.
 fn run(
     number: u64,
-    fault: Option<(f64, Fault)>,
+    fault: Option<(f64, InjectedFault)>,
 ) -> Result<(bool, Option<u64>, f64), SimulationError> {
     let share = |k: u64| ((number * 2_654_435_761 + k * 40_503) % 1000) as f64 / 1000.0;
     let duration = 2.0 + 6.0 * share(1);
     let (a, b) = (10.0 + 20.0 * share(2), 20.0 + 30.0 * share(3));
     let settings = (&Controller::default(), &Safety::default());
-    let robot = models::robot()?;
+    let robot = sample_experiments::robot()?;
     let done = if number.is_multiple_of(2) {
         let ends = ([-60.0, 50.0], [-60.0 + a, 50.0 + b]);
-        let arm = arm_core::models::mechanical_arm();
-        let mut e: Experiment<2> = models::led(arm, Shape::Smooth, ends, duration, [0.0; 2])?;
+        let arm = arm_core::sample_arms::mechanical_arm();
+        let mut e: Experiment<2> =
+            sample_experiments::led(arm, Shape::Smooth, ends, duration, [0.0; 2])?;
         e.robot = Some(robot);
         control(&e, settings, fault, number)?
     } else {
         let ends = ([-68.0, 40.0, 0.0], [-68.0 + a, 40.0 + b, 5.0]);
-        let arm = arm_core::models::human_arm();
+        let arm = arm_core::sample_arms::human_arm();
         let rest = [-1.1, 0.9, 0.05];
-        let mut e: Experiment<3> = models::led(arm, Shape::Trapezoid, ends, duration, rest)?;
+        let mut e: Experiment<3> =
+            sample_experiments::led(arm, Shape::Trapezoid, ends, duration, rest)?;
         e.robot = Some(robot);
         control(&e, settings, fault, number)?
     };
@@ -47,15 +51,15 @@ fn main() -> Result<(), SimulationError> {
     }
     println!("{stopped} of {runs} clean runs were stopped");
     let faults = [
-        Fault::Runaway(0),
-        Fault::Runaway(1),
-        Fault::Frozen(0),
-        Fault::Frozen(1),
-        Fault::NotANumber(0),
-        Fault::NotANumber(1),
-        Fault::Late(1e-3),
-        Fault::Pressed([150.0, 0.0]),
-        Fault::Pressed([0.0, -150.0]),
+        InjectedFault::Runaway(0),
+        InjectedFault::Runaway(1),
+        InjectedFault::Frozen(0),
+        InjectedFault::Frozen(1),
+        InjectedFault::NotANumber(0),
+        InjectedFault::NotANumber(1),
+        InjectedFault::Late(1e-3),
+        InjectedFault::Pressed([150.0, 0.0]),
+        InjectedFault::Pressed([0.0, -150.0]),
     ];
     for fault in faults {
         let (mut seen, mut latest, mut force) = (0, 0, 0.0_f64);

@@ -118,18 +118,18 @@ pub enum SimulationError {
     },
     /// An accuracy that no admissible step reaches.
     #[error(
-        "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {asked:e} rad; steps shorter than 1e-6 s are not tried"
+        "at a step of {dt:.3e} s the angles are accurate to {reached:.2e} rad, requested are {requested:e} rad; steps shorter than 1e-6 s are not tried"
     )]
     Accuracy {
         /// Requested accuracy \[rad\].
-        asked: f64,
+        requested: f64,
         /// Estimated error at the shortest step \[rad\].
         reached: f64,
         /// That step \[s\].
         dt: f64,
     },
     /// More memory than there is.
-    #[error("the result needs {} of memory, {}", Bytes(*needed), room(*available))]
+    #[error("the result needs {} of memory, {}", Bytes(*needed), remaining(*available))]
     Memory {
         /// What it needs \[bytes\].
         needed: u64,
@@ -163,7 +163,7 @@ impl core::fmt::Display for Bytes {
 }
 
 /// How much there is, as text.
-fn room(available: Option<u64>) -> String {
+fn remaining(available: Option<u64>) -> String {
     available.map_or("more than the system gives".to_owned(), |bytes| {
         format!("{} are available", Bytes(bytes))
     })

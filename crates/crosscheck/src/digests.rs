@@ -6,7 +6,9 @@ use arm_core::estimator::{Estimator, Sample, Settings};
 use arm_core::{Chain, Elbow, Equation, Joints, Measured, Real, Robot, Segment};
 use arm_ident::inference::joint_method::{Options, identify};
 use arm_ident::regression::trial::{Model, Trial};
-use arm_sim::{Channel, Integrator, Sensors, digest, models, simulate, simulate_batch};
+use arm_sim::{
+    Integrator, SensorChannel, Sensors, digest, sample_experiments, simulate, simulate_batch,
+};
 
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -20,7 +22,7 @@ pub fn of_values(values: impl IntoIterator<Item = f64>) -> u64 {
 
 /// Four seconds of the mechanical arm, read by sensors: the trial, and the joint angles that follow from the robot's.
 fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
-    let mut experiment = models::mechanical_experiment(4.0, [-0.8, 1.0])?;
+    let mut experiment = sample_experiments::mechanical_experiment(4.0, [-0.8, 1.0])?;
     let robot = Robot::new([0.45, 0.45], [1.0, -0.1], Elbow::Up)?;
     experiment.robot = Some(robot);
     experiment.output_interval = Some(2e-3);
@@ -28,8 +30,8 @@ fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
     let mut sensors = Sensors::ideal();
     sensors.rate = 500.0;
     sensors.seed = 3;
-    sensors.angle = [Channel::white(1e-3); 2];
-    sensors.force = [Channel::white(0.1); 2];
+    sensors.angle = [SensorChannel::white(1e-3); 2];
+    sensors.force = [SensorChannel::white(0.1); 2];
     let read = sensors.read(&experiment, &recording)?;
     let pairs = |v: &[f64]| -> Vec<[f64; 2]> { v.chunks_exact(2).map(|c| [c[0], c[1]]).collect() };
     let robot_q = pairs(&read.robot_q);
@@ -48,7 +50,7 @@ fn trial() -> Outcome<(Trial<2>, Vec<Joints<f64, 2>>)> {
 
 /// A tenth too heavy, with springs and friction to be found; there is no dry friction, so that bounds bind.
 fn model() -> Outcome<Model<2>> {
-    let truth = arm_core::models::mechanical_arm();
+    let truth = arm_core::sample_arms::mechanical_arm();
     let heavy = truth.segments().map(|s| Segment {
         mass: 1.1 * s.mass,
         inertia: 1.1 * s.inertia,
@@ -65,7 +67,7 @@ fn model() -> Outcome<Model<2>> {
         segment_uncertainty: 0.1,
         fitted,
         held: Vec::new(),
-        contact: arm_core::Contact::new([models::STIFFNESS; 2], [0.0; 2]),
+        contact: arm_core::Contact::new([sample_experiments::STIFFNESS; 2], [0.0; 2]),
     })
 }
 
@@ -113,7 +115,7 @@ fn estimation<T: Real>(
 
 /// The digests by their names.
 pub fn digests() -> Outcome<[(&'static str, u64); 7]> {
-    let mut experiment = models::reference()?;
+    let mut experiment = sample_experiments::reference()?;
     let rk4 = digest(&simulate(&experiment)?)?;
     let threads = if cfg!(target_family = "wasm") { 1 } else { 2 };
     let lanes = simulate_batch(&[experiment.clone(), experiment.clone()], threads);

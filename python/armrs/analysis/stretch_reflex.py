@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .._armrs import THRESHOLD
 from . import students_t
 from .cluster_robust import deviations
 
@@ -25,8 +26,6 @@ FEWEST = 4
 """Fewest trials from which the scatter between them is estimated."""
 LEVEL = 0.95
 """Probability of the intervals."""
-NEEDED = 12.0
-"""Twice the log-likelihood, beyond its price, that an angle threshold must gain: as an effect must in `armrs gap`."""
 RESTING = 0.05
 """Speed below which a joint rests [rad/s]: dry friction then holds it with any torque up to its own."""
 HELD = 0.1
@@ -256,7 +255,7 @@ class _Problem:
         return np.concatenate([found.x * scale, shape[free:]])
 
     def with_angle(self, direction: int, shape: np.ndarray) -> tuple[np.ndarray, int]:
-        """Return the shape with an angle threshold where the data need it, and how many numbers of it are free."""
+        """Return the shape, with an angle threshold if it gains what `armrs gap` requires, and how many numbers of it are free."""
         angles = np.percentile(np.concatenate([s.q for s in self.stretches]), (25.0, 60.0, 95.0))
         starts = [
             np.array([share * shape[0], shape[1], angle, slope])
@@ -268,7 +267,7 @@ class _Problem:
         wider = self.refined(direction, best, 4)
         n = self._independent(self.residual(direction, wider))
         gained = n * np.log(self.cost(direction, shape) / max(self.cost(direction, wider), 1e-300))
-        return (wider, 4) if gained > NEEDED + 2.0 * np.log(n) else (shape, 2)
+        return (wider, 4) if gained > THRESHOLD + 2.0 * np.log(n) else (shape, 2)
 
     def residual(self, direction: int, shape: np.ndarray) -> np.ndarray:
         """Return what is left of the moments."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import ArmrsError, BadInput, Text, unknown_name
+from ..errors import NO_FILE, ArmrsError, BadInput, Text, unknown_name
 from ..io import files
 from ..report import console
 from .common import JsonFile, OutFolder, listed, present, writable
@@ -148,8 +148,10 @@ def _suffix_of(source: Path, readable: tuple[str, ...]) -> str:
     suffix = source.suffix.lower()
     if source.is_dir() or suffix in (*readable, ".toml"):
         return "" if source.is_dir() else suffix
-    found = f"suffix {source.suffix!r}" if os.path.lexists(source) else "No such file or directory"
-    raise BadInput("file", Text(found), f"a data set's folder or dataset.toml, or a file of {', '.join(readable)}", file=source)
+    allowed = f"a data set's folder or dataset.toml, or a file of {', '.join(readable)}"
+    if os.path.lexists(source):
+        raise BadInput("file", Text(f"suffix {source.suffix!r}"), allowed, file=source)
+    raise BadInput("file", NO_FILE, allowed, file=source, kind="missing_source")
 
 
 def report(

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from .. import checks
-from ..errors import BadInput, Text
+from ..errors import BadInput, Text, unreadable
 from ..fmu.archive import archive, refuse_xml, unpack, xml_root
 from ..fmu.isolated_slave import IsolatedSlave
 from ..fmu.slave_interface import Partner
@@ -375,7 +375,7 @@ def _xml(path: Path, prefix: str, tag: str) -> ElementTree.Element:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise BadInput("file", Text(error.strerror or "unreadable"), "a file that can be read", file=path) from None
+        raise unreadable(error, file=path) from None
     refuse_xml(path.name, content, path)
     try:
         root = xml_root("XML", content)

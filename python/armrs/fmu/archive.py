@@ -10,7 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from .. import checks
-from ..errors import BadInput, Text
+from ..errors import BadInput, RefusalKind, Text
 
 DESCRIPTION = "modelDescription.xml"
 MOST_XML = 64 << 20
@@ -45,7 +45,8 @@ def archive(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
         raise
     except (OSError, ValueError, NotImplementedError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or str(error) or "not a valid file name"
-        raise BadInput("file", Text(reason), "a file that can be read", file=path) from None
+        kind: RefusalKind = "missing_file" if isinstance(error, FileNotFoundError) else "value"
+        raise BadInput("file", Text(reason), "a file that can be read", file=path, kind=kind) from None
     with files:
         if len(files.infolist()) > MOST_FILES:
             raise BadInput("archive", Text(f"{len(files.infolist())} files"), f"at most {MOST_FILES}", file=path)

@@ -172,8 +172,8 @@ class IsolatedSlave(Partner):
             function, status, message = answer["slave_error"]
             raise SlaveError(function, Status(status) if 0 <= status <= Status.FATAL else Status.FATAL, message)
         if "bad_input" in answer:
-            place, found, allowed = answer["bad_input"]
-            raise BadInput(place, Text(found), allowed, file=self.path)
+            place, found, allowed, kind = answer["bad_input"]
+            raise BadInput(place, Text(found), allowed, file=self.path, kind=kind)
         return answer
 
     def _ended(self, call: str, error: ProcessEnded) -> SlaveError:

@@ -92,7 +92,7 @@ def _refusal(error: ArmrsError) -> dict[str, Any]:
     if isinstance(error, SlaveError):
         return {"slave_error": [error.function, int(error.status), error.message]}
     if isinstance(error, BadInput):
-        return {"bad_input": [error.place, str(error.found), error.allowed]}
+        return {"bad_input": [error.place, str(error.found), error.allowed, error.kind]}
     return {"slave_error": ["call", 3, str(error)]}
 
 

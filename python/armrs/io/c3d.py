@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ArmrsError, BadInput, Text
+from ..errors import ArmrsError, BadInput, Text, unreadable
 from . import reader_process
 
 _BLOCK = 512
@@ -102,7 +102,7 @@ def _check_header(path: Path) -> None:
             stream.seek(_BLOCK * (head[0] - 1) + 3)
             processor = stream.read(1)
     except OSError as error:
-        raise BadInput("file", Text(error.strerror or "unreadable"), "a file that can be read") from None
+        raise unreadable(error) from None
     if processor not in (b"\x54", b"\x55", b"\x56"):
         raise BadInput("file", Text("no parameters where the header says"), "a whole C3D file")
     if processor != b"\x54":  # other byte orders are left to the reader

@@ -289,7 +289,7 @@ def read_entry(path: Path, entry: TrialEntry, n_joints: int, description: Descri
             role=entry.role,
         )
     except BadInput as error:
-        raise (_missing(path, entry, description) if error.found is NO_FILE else error.within(file=path)) from None
+        raise (_missing(path, entry, description) if error.kind == "missing_file" else error.within(file=path)) from None
     if reading is None and entry.role == "fit":
         raise _empty(path)
     return reading
@@ -312,7 +312,9 @@ def _missing(path: Path, entry: TrialEntry, description: Description) -> BadInpu
         there = [one.name for one in path.parent.iterdir() if one.suffix.lower() in SUFFIXES]
         near = nearest(path.name, [name for name in there if name not in taken])
     hint = near and f"in that folder and in no entry: {near}"
-    return BadInput(f"[[trial]] {named.index(entry.file) + 1} of {FILE}, file", NO_FILE, "a file that exists", file=path, hint=hint)
+    return BadInput(
+        f"[[trial]] {named.index(entry.file) + 1} of {FILE}, file", NO_FILE, "a file that exists", file=path, hint=hint, kind="missing_file"
+    )
 
 
 def name_of(path: Path, description: Description) -> str:
@@ -345,7 +347,7 @@ def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
     """Return the path of a `dataset.toml` and its contents."""
     path = checks.path("source", source)
     if not os.path.lexists(path):
-        raise BadInput("file", Text("No such file or directory"), f"a folder with {FILE}, or that file", file=source)
+        raise BadInput("file", NO_FILE, f"a folder with {FILE}, or that file", file=source, kind="missing_source")
     trial = path.suffix.lower() in SUFFIXES and path.is_file()
     if trial or (path.is_dir() and not os.path.lexists(path / FILE)):
         above = next((folder for folder in (path.parent, path.parent.parent) if (folder / FILE).is_file()), None)

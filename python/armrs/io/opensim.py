@@ -162,7 +162,7 @@ def _lines(path: Path) -> list[str]:
     try:
         lines = tomlfile.read_text(path, "a text file", most=_LARGEST).splitlines()
     except BadInput as error:
-        raise BadInput(error.place, error.found, error.allowed) from None
+        raise BadInput(error.place, error.found, error.allowed, kind=error.kind) from None
     # A spreadsheet program leaves commas between the cells.
     saved_again = any(line.startswith("PathFileType,") or line.strip().lower().startswith("endheader,") for line in lines)
     return [line.replace(",", "\t").rstrip("\t") for line in lines] if saved_again else lines

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NO_FILE, BadInput, Text, not_utf8, show
+from ..errors import NO_FILE, BadInput, Text, not_utf8, show, unreadable
 from .files import may_replace, replacing
 
 SUFFIXES = (".csv", ".parquet")
@@ -69,10 +69,12 @@ def read_samples(path: Path) -> Samples:
         raise BadInput("file", Text(f"suffix {path.suffix!r}"), " or ".join(SUFFIXES))
     try:
         if not path.is_file():
-            raise BadInput("file", Text("a folder") if path.is_dir() else NO_FILE, "a file that exists")
+            if path.is_dir():
+                raise BadInput("file", Text("a folder"), "a file that exists")
+            raise BadInput("file", NO_FILE, "a file that exists", kind="missing_file")
         samples = _read_csv(path) if suffix == ".csv" else _read_parquet(path)
     except OSError as error:
-        raise BadInput("file", Text(error.strerror or "unreadable"), "a file that can be read") from None
+        raise unreadable(error) from None
     except ValueError as error:
         if isinstance(error, BadInput):
             raise

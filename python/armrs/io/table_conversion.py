@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..errors import BadInput, Sentence, Text
+from ..errors import BadInput, Sentence, Text, unreadable
 from . import files
 from .dataset import FILE, describe, described_model, name_of, output_names
 from .samples import NUMBER, SUFFIXES, csv_place, explain_csv, header_of, parquet_table, write_table
@@ -102,7 +102,7 @@ def read_table(path: Path) -> Any:
     try:
         return _csv_table(path) if path.suffix.lower() == ".csv" else _plain_parquet(path)
     except OSError as error:
-        raise BadInput("file", Text(error.strerror or "unreadable"), "a file that can be read") from None
+        raise unreadable(error) from None
 
 
 def _job(source: Path, target: Path) -> _Job:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from .. import checks
-from ..errors import BadInput, Text, not_utf8
+from ..errors import BadInput, Text, not_utf8, unreadable
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -73,7 +73,7 @@ def read_text(path: str | os.PathLike[str], what: str, most: int = _LIMIT) -> st
         is_folder, is_file, size = file.is_dir(), file.is_file(), file.stat().st_size
         raw = file.read_bytes() if is_file and size <= most else b""
     except OSError as error:
-        raise BadInput("file", Text(error.strerror or "unreadable"), f"{what} that can be read", file=path) from None
+        raise unreadable(error, what, file=path) from None
     except ValueError:  # a path with a null character
         raise BadInput("file", Text("a name no file can have"), what, file=path) from None
     if is_folder:

@@ -159,7 +159,7 @@ def load_log(path: str | os.PathLike[str], n_joints: int, *, force_on: str | Non
     try:
         return _read(source, n_joints, force_on)
     except BadInput as error:
-        raise BadInput(error.place, error.found, error.allowed, file=source, hint=error.hint) from None
+        raise error.within(file=source) from None
 
 
 def _read(source: Path, n_joints: int, force_on: str | None) -> Log:

@@ -35,7 +35,6 @@ RUNAWAY = 30.0
 """Speed of a joint beyond which a run is none of a led arm [rad/s]."""
 PIECE = 16384
 """Samples of a run that are held, drawn and written at once."""
-_MOST_STEPS = 10**9
 _MOST_SEEDS = 10**5
 _MOST_START = 100.0
 """Largest angle to start from [rad], as of a rest angle: turns beyond change nothing but the precision."""
@@ -548,8 +547,8 @@ def _start(angles: np.ndarray) -> list[float]:
 def _check_duration(duration: float, dt: float, rate: float) -> None:
     """Refuse a length of a run that is no whole number of steps, or holds no sample interval."""
     checks.number("duration", duration, above=0.0, unit="s")
-    if not 1.0 / rate <= duration < _MOST_STEPS * dt:
-        raise BadInput("duration", duration, f"{1.0 / rate:g} s (one interval between samples) to {_MOST_STEPS * dt:g} s")
+    if not 1.0 / rate <= duration < _armrs.MOST_STEPS * dt:
+        raise BadInput("duration", duration, f"{1.0 / rate:g} s (one interval between samples) to {_armrs.MOST_STEPS * dt:g} s")
     steps = duration / dt
     if abs(steps - round(steps)) > 1e-9 * steps:
         raise BadInput("duration", duration, f"a whole number of steps of {dt:g} s", hint=f"nearest: {round(steps) * dt:.9g} s")

@@ -4,23 +4,23 @@
 //! what it does. An [`Effect`] is one instance: a kind at a joint, segment or channel, with values. Everything outside
 //! this folder works on `Effect`s and never names a kind.
 //!
-//! To add a kind, write its file and add one line to the `catalogue!` below. A kind of one's own that needs no place in the
-//! catalogue is an `OwnLaw` (feature `own`).
+//! To add a kind, write its file and add one line to the `catalogue!` below. A user-defined kind that needs no place in the
+//! catalogue is an `CustomLaw` (feature `custom-effects`).
 
 mod law;
 // Firmware has the catalogue alone, without code for declared kinds.
-#[cfg_attr(not(feature = "own"), path = "own_absent.rs")]
-mod own;
+#[cfg_attr(not(feature = "custom-effects"), path = "custom_effect_absent.rs")]
+mod custom_effect;
 mod place;
 mod prior;
 mod state;
 
+pub use custom_effect::CustomEffect;
+#[cfg(feature = "custom-effects")]
+pub use custom_effect::CustomLaw;
 pub use law::{
     ActsOn, Info, Law, Local, MAX_PARAMETERS, MAX_STATES, Parameter, Parameters, States,
 };
-pub use own::Own;
-#[cfg(feature = "own")]
-pub use own::OwnLaw;
 pub use place::Place;
 pub use prior::{Family, Nature, Part, Prior, Promise, Values};
 pub use state::{advance_states, any_state};
@@ -38,7 +38,7 @@ macro_rules! catalogue {
         pub enum Kind {
             $(#[doc = concat!("See `effect/", stringify!($module), ".rs`.")] $law,)*
             /// One that the catalogue does not hold.
-            Own(Own),
+            Custom(CustomEffect),
         }
 
         /// All kinds of the catalogue, in the order in which they are listed.
@@ -47,22 +47,22 @@ macro_rules! catalogue {
         impl Kind {
             /// Name, parameters, formula and reference.
             pub fn info(self) -> &'static Info {
-                match self { $(Self::$law => const { &listed(<$module::$law as Law>::INFO) },)* Self::Own(own) => own.info() }
+                match self { $(Self::$law => const { &listed(<$module::$law as Law>::INFO) },)* Self::Custom(own) => own.info() }
             }
         }
 
         impl Kind {
             /// What is known of it before any data.
             pub fn prior(self) -> Prior {
-                match self { $(Self::$law => <$module::$law as Law>::PRIOR,)* Self::Own(own) => own.prior() }
+                match self { $(Self::$law => <$module::$law as Law>::PRIOR,)* Self::Custom(own) => own.prior() }
             }
             /// What it is called in a sentence, where that is not its kind with spaces.
             pub const fn title(self) -> Option<&'static str> {
-                match self { $(Self::$law => <$module::$law as Law>::TITLE,)* Self::Own(_) => None }
+                match self { $(Self::$law => <$module::$law as Law>::TITLE,)* Self::Custom(_) => None }
             }
             /// What it acts on.
             pub const fn acts_on(self) -> ActsOn {
-                match self { $(Self::$law => <$module::$law as Law>::ACTS_ON,)* Self::Own(_) => ActsOn::Joints }
+                match self { $(Self::$law => <$module::$law as Law>::ACTS_ON,)* Self::Custom(_) => ActsOn::Joints }
             }
             /// The family of effects that it belongs to.
             pub fn family(self) -> Family {
@@ -70,23 +70,23 @@ macro_rules! catalogue {
             }
             /// Whether it also acts in the joint before, so that it cannot stand at the first one.
             pub const fn crosses(self) -> bool {
-                match self { $(Self::$law => <$module::$law as Law>::CROSSES,)* Self::Own(_) => false }
+                match self { $(Self::$law => <$module::$law as Law>::CROSSES,)* Self::Custom(_) => false }
             }
             /// Whether its torque is a constant, or one whose sign alone follows the motion.
             pub const fn is_rate_independent(self) -> bool {
-                match self { $(Self::$law => <$module::$law as Law>::RATE_INDEPENDENT,)* Self::Own(_) => false }
+                match self { $(Self::$law => <$module::$law as Law>::RATE_INDEPENDENT,)* Self::Custom(_) => false }
             }
             /// Position of the parameter that makes its dry friction smooth, if it has any.
             pub const fn smoothed_by(self) -> Option<usize> {
-                match self { $(Self::$law => <$module::$law as Law>::SMOOTHED_BY,)* Self::Own(_) => None }
+                match self { $(Self::$law => <$module::$law as Law>::SMOOTHED_BY,)* Self::Custom(_) => None }
             }
             /// Whether it depends on the force through the joint.
             pub fn feels_force(self) -> bool {
-                match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Own(own) => own.feels_force() }
+                match self { $(Self::$law => <$module::$law as Law>::FEELS_FORCE,)* Self::Custom(own) => own.feels_force() }
             }
             /// Whether it depends on the activity of muscles, which must be given.
             pub const fn feels_activity(self) -> bool {
-                match self { $(Self::$law => <$module::$law as Law>::FEELS_ACTIVITY,)* Self::Own(_) => false }
+                match self { $(Self::$law => <$module::$law as Law>::FEELS_ACTIVITY,)* Self::Custom(_) => false }
             }
             /// Whether it acts on the rig or the sensors, or depends on more than the motion of an arm.
             pub fn needs_more_than_an_arm(self) -> bool {
@@ -101,13 +101,13 @@ macro_rules! catalogue {
                 if !self.on { return T::ZERO; }
                 match self.kind {
                     $(Kind::$law => $module::$law::torque(&self.parameters, at),)*
-                    Kind::Own(own) => own.torque(&self.parameters, at),
+                    Kind::Custom(own) => own.torque(&self.parameters, at),
                 }
             }
             /// `[constant, to the angle, to the speed]` of the torque, where it is no more than that.
             pub fn affine(&self) -> Option<[T; 3]> {
                 if !self.on { return None; }
-                match self.kind { $(Kind::$law => $module::$law::affine(&self.parameters),)* Kind::Own(_) => None }
+                match self.kind { $(Kind::$law => $module::$law::affine(&self.parameters),)* Kind::Custom(_) => None }
             }
             /// Whether it is a constant moment, which is what the rest angle of a spring in its joint stands for too.
             pub fn is_constant(&self) -> bool {
@@ -117,12 +117,12 @@ macro_rules! catalogue {
             #[inline]
             pub fn dry(&self, at: &Local<T>) -> T {
                 if !self.on { return T::ZERO; }
-                match self.kind { $(Kind::$law => $module::$law::dry(&self.parameters, at),)* Kind::Own(_) => T::ZERO }
+                match self.kind { $(Kind::$law => $module::$law::dry(&self.parameters, at),)* Kind::Custom(_) => T::ZERO }
             }
             /// Its torque without dry friction \[N m\].
             #[inline]
             pub fn besides_dry(&self, at: &Local<T>) -> T {
-                match self.kind { $(Kind::$law => $module::$law::besides_dry(&self.parameters, at),)* Kind::Own(_) => T::ZERO }
+                match self.kind { $(Kind::$law => $module::$law::besides_dry(&self.parameters, at),)* Kind::Custom(_) => T::ZERO }
             }
             /// Derivatives of [`Effect::torque`] to the parameters.
             #[inline]
@@ -130,7 +130,7 @@ macro_rules! catalogue {
                 if !self.on { return [T::ZERO; MAX_PARAMETERS]; }
                 match self.kind {
                     $(Kind::$law => $module::$law::gradient(&self.parameters, at),)*
-                    Kind::Own(_) => [T::ZERO; MAX_PARAMETERS],
+                    Kind::Custom(_) => [T::ZERO; MAX_PARAMETERS],
                 }
             }
             /// Its torque for each unit of its linear parameters, which come first: all that a controller evaluates of a law. Zero for
@@ -149,7 +149,7 @@ macro_rules! catalogue {
                             *unit = value;
                         }
                     })*
-                    Kind::Own(_) => {}
+                    Kind::Custom(_) => {}
                 }
                 units
             }
@@ -157,14 +157,14 @@ macro_rules! catalogue {
             #[inline]
             pub fn proximal_share(&self) -> T {
                 if !self.on { return T::ZERO; }
-                match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters),)* Kind::Own(_) => T::ZERO }
+                match self.kind { $(Kind::$law => $module::$law::proximal_share(&self.parameters),)* Kind::Custom(_) => T::ZERO }
             }
             /// Whether what it does depends on states of its own.
             #[cfg_attr(target_os = "none", inline(never))]
             pub fn remembers(&self) -> bool {
                 match self.kind {
                     $(Kind::$law => <$module::$law as Law>::INFO.states > 0 && !$module::$law::forgets(&self.parameters),)*
-                    Kind::Own(own) => own.info().states > 0,
+                    Kind::Custom(own) => own.info().states > 0,
                 }
             }
             /// Time derivatives of the effect's own states.
@@ -174,7 +174,7 @@ macro_rules! catalogue {
                 if !self.on { return [T::ZERO; MAX_STATES]; }
                 match self.kind {
                     $(Kind::$law => $module::$law::memory_rate(&self.parameters, at),)*
-                    Kind::Own(own) => own.memory_rate(&self.parameters, at),
+                    Kind::Custom(own) => own.memory_rate(&self.parameters, at),
                 }
             }
             /// Adds the torque with which the joints of a moving arm resist; nothing for an index beyond the arm.
@@ -189,7 +189,7 @@ macro_rules! catalogue {
                             total[self.index - 1] += $module::$law::proximal_share(&self.parameters) * torque;
                         }
                     })*
-                    Kind::Own(own) => {
+                    Kind::Custom(own) => {
                         total[self.index] += own.torque(&self.parameters, &motion.local(self.index, memory));
                     }
                 }
@@ -197,12 +197,12 @@ macro_rules! catalogue {
             /// Changes the rig before a run.
             pub fn alter<const N: usize>(&self, setup: &mut Setup<T, N>) {
                 if !self.on { return; }
-                match self.kind { $(Kind::$law => $module::$law::alter(&self.parameters, self.index, setup),)* Kind::Own(_) => {} }
+                match self.kind { $(Kind::$law => $module::$law::alter(&self.parameters, self.index, setup),)* Kind::Custom(_) => {} }
             }
             /// Changes what the sensors read.
             pub fn distort<const N: usize>(&self, reading: &mut Reading<T, N>) {
                 if !self.on { return; }
-                match self.kind { $(Kind::$law => $module::$law::distort(&self.parameters, self.index, reading),)* Kind::Own(_) => {} }
+                match self.kind { $(Kind::$law => $module::$law::distort(&self.parameters, self.index, reading),)* Kind::Custom(_) => {} }
             }
         }
     };

@@ -1,8 +1,8 @@
 //! Estimates of the unknowns, and the state of an estimator.
 
 use super::sample::SampleStatus;
-use crate::equation::Prior;
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
+use crate::regression::Prior;
 
 /// What a value rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use core::array::from_fn;
 
-use crate::covariance::copy_triangle;
-use crate::scalar::Real;
+use crate::numeric::covariance::copy_triangle;
+use crate::numeric::scalar::Real;
 
 /// The triangular system `R x = z` whose least-squares solution is the estimate, with `RᵀR = UᵀDU` the inverse covariance.
 ///

@@ -9,8 +9,8 @@
 //! is forgotten comes back from the prior, so that what a movement does not show returns to what was known before instead of
 //! drifting.
 
-mod channel;
 mod estimate;
+mod filtered_channel;
 mod information;
 mod sample;
 mod schedule;
@@ -18,12 +18,12 @@ mod settings;
 mod window;
 mod work;
 
-pub use channel::Fault;
 pub use estimate::{Decision, Estimate, Health};
+pub use filtered_channel::Fault;
 pub use sample::{Sample, SampleStatus};
 pub use settings::Settings;
 
-use channel::{Channel, Checks, restart, values};
+use filtered_channel::{Checks, FilteredChannel, restart, values};
 use information::{Information, Row};
 use schedule::Work;
 use settings::Tuning;
@@ -31,11 +31,11 @@ use window::Windows;
 
 use core::array::from_fn;
 
-use crate::compensation::GravityCompensation;
-use crate::covariance::Covariance;
+use crate::control::gravity_compensation::GravityCompensation;
 use crate::effect::{MAX_STATES, Motion, States};
-use crate::equation::{Equation, Measured, Needed, Prior};
-use crate::scalar::Real;
+use crate::numeric::covariance::Covariance;
+use crate::numeric::scalar::Real;
+use crate::regression::{Equation, Measured, Needed, Prior};
 use crate::{Invalid, joints};
 
 /// Rows over which the usual size of the unexplained torque is averaged.
@@ -48,9 +48,9 @@ pub struct Estimator<T, const N: usize, const P: usize, const E: usize> {
     priors: [Prior<T>; P],
     tuning: Tuning<T, N>,
     /// Angles, angles that lead, torques.
-    joints: [[Channel<T>; N]; 3],
+    joints: [[FilteredChannel<T>; N]; 3],
     /// Force in y and z, moment.
-    hand: [Channel<T>; 3],
+    hand: [FilteredChannel<T>; 3],
     /// False until the first good sample, and after a gap.
     running: bool,
     /// Whether speeds come from angles of their own.
@@ -115,8 +115,8 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         Ok(Self {
             equation,
             priors,
-            joints: [[Channel::new(); N]; 3],
-            hand: [Channel::new(); 3],
+            joints: [[FilteredChannel::new(); N]; 3],
+            hand: [FilteredChannel::new(); 3],
             tuning,
             running: false,
             led: false,
@@ -227,7 +227,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         }
         let fault = match sensed {
             Ok(()) => return self.learn(due),
-            Err(heed) => heed,
+            Err(status) => status,
         };
         if fault == SampleStatus::Refused(Fault::Frozen) {
             // Samples since it froze are discarded too.
@@ -360,7 +360,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
     /// At rest it is added as well, for to leave out slow samples would favour one side of every reversal; what counts is
     /// whether the arm moved at any time in the window.
     fn learn(&mut self, due: bool) -> SampleStatus {
-        let heed = if due {
+        let status = if due {
             self.since_row = 0;
             self.weigh()
         } else {
@@ -368,7 +368,7 @@ impl<T: Real, const N: usize, const P: usize, const E: usize> Estimator<T, N, P,
         };
         self.windows.open().moved |= self.moving;
         self.age();
-        match heed {
+        match status {
             SampleStatus::Taken if !self.moving => SampleStatus::Resting,
             other => other,
         }

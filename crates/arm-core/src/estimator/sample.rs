@@ -1,9 +1,9 @@
 //! What an estimator is given in one control period, and what became of it.
 
-use super::channel::Fault;
+use super::filtered_channel::Fault;
 use crate::Joints;
-use crate::equation::Measured;
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
+use crate::regression::Measured;
 
 /// The measurements of one control period.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,10 @@
 //! How an estimator works, and what follows from it for one control period.
 
-use super::channel::Cutoff;
+use super::filtered_channel::Cutoff;
 use super::sample::Sample;
 use super::schedule::budget;
 use crate::check::{SMALLEST, at_least_zero, finite, ordered, positive};
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 use crate::{Chain, Invalid, Joints};
 
 /// How an estimator works. Made by [`Settings::new`]; every guard has a finite value that fits the arm.

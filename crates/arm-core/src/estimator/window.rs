@@ -2,7 +2,7 @@
 
 use super::information::Row;
 use super::settings::Tuning;
-use crate::scalar::Real;
+use crate::numeric::scalar::Real;
 
 /// Sums over a window of rows that the movement made meaningful.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,8 +3,8 @@
 use super::information::Row;
 use super::schedule::{Work, split};
 use super::{Decision, Estimate, Estimator};
-use crate::covariance::copy_triangle;
-use crate::scalar::Real;
+use crate::numeric::covariance::copy_triangle;
+use crate::numeric::scalar::Real;
 
 /// Share of the prior's variance that the data must have taken away before an unknown counts as identified.
 const MEASURED: f64 = 0.9;

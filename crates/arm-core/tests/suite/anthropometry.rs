@@ -1,7 +1,7 @@
 //! Literature values against the thesis' tables and the worked numbers of the errata.
 
 use arm_core::anthropometry::{Axis, Grip, PARTS, Part, Sex, Subject};
-use arm_core::{Body, Invalid, models};
+use arm_core::{Body, Invalid, sample_arms};
 
 fn man(body_mass: f64, height: f64) -> Subject {
     Subject::new(body_mass, height, Sex::Male).expect("a possible man")
@@ -76,7 +76,7 @@ fn moments_of_inertia_of_appendix_d() {
         ));
     }
     // The sample arm has those about the axes of the joints; that of its hand has the handle besides.
-    let [upper_arm, forearm, hand] = models::human_arm().segments().map(|s| s.inertia);
+    let [upper_arm, forearm, hand] = sample_arms::human_arm().segments().map(|s| s.inertia);
     let across = |part, length| by_radius(part, length, Axis::Transverse);
     assert!(printed(across(Part::UpperArm, 0.322), upper_arm, 1e-4));
     assert!(printed(across(Part::Forearm, 0.264), forearm, 1e-4));

@@ -1,6 +1,6 @@
 //! Composition of bodies: arithmetic in the head, the thesis' handle and orthosis, and errata 8 to 10.
 
-use arm_core::{Body, Segment, models};
+use arm_core::{Body, Segment, sample_arms};
 
 use crate::common::Random;
 
@@ -111,9 +111,9 @@ fn handle_on_the_hand_of_equation_3_14() {
 /// Errata 8 and 9: the printed l1 mixes distances from the shoulder with one from the elbow.
 #[test]
 fn orthosis_of_equation_3_20() {
-    let [upper_arm, forearm, _] = *models::human_arm().segments();
+    let [upper_arm, forearm, _] = *sample_arms::human_arm().segments();
     let [m_ua, l_ua, a1] = [upper_arm.mass, upper_arm.com[0], upper_arm.length];
-    let [upper, lower] = models::orthosis().on(&upper_arm, &forearm);
+    let [upper, lower] = sample_arms::orthosis().on(&upper_arm, &forearm);
     assert!(close(upper.mass, 2.314, 1e-12) && close(lower.mass, 1.455, 1e-12));
     assert!(close(upper.com[0], 0.1899, 5e-5));
     let printed = a1 - (l_ua * m_ua + 0.091 * 0.200) / (m_ua + 0.200);

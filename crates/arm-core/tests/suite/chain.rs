@@ -1,6 +1,6 @@
 //! Refused arms: one thing of an accepted arm broken at a time.
 
-use arm_core::{Chain, Invalid, Lanes, Scalar, Segment, models};
+use arm_core::{Chain, Invalid, Lanes, Scalar, Segment, sample_arms};
 
 const SEGMENT: Segment<f64> = Segment {
     length: 0.3,
@@ -69,7 +69,7 @@ fn one_broken_value_at_a_time() {
 
 #[test]
 fn broken_rotors() {
-    let arm = models::mechanical_arm();
+    let arm = sample_arms::mechanical_arm();
     assert!(arm.with_rotor_inertia([0.0, 0.1]).is_ok());
     for (rotor, message) in [
         ([0.0, -0.1], "rotor inertia of joint 2 is -0.1"),
@@ -97,7 +97,7 @@ fn one_lane_is_enough_to_be_refused() {
 
 #[test]
 fn a_cast_arm_is_the_same_arm() {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     assert_eq!(arm.cast::<f64>(), arm);
     let wide = arm.cast::<Lanes<4>>();
     assert_eq!(wide.first_moments().map(|x| x.0[3]), *arm.first_moments());

@@ -1,7 +1,7 @@
 //! The contact between hand and handle, and the rig that effects alter.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Contact, Invalid, Scalar, Setup, models};
+use arm_core::{Contact, Invalid, Scalar, Setup, sample_arms};
 
 use crate::common::Random;
 use crate::dual::Dual;
@@ -63,7 +63,7 @@ fn damping_takes_energy() {
 
 #[test]
 fn an_impossible_rig_is_named() {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let mut rig = Setup::new(&arm, loose());
     assert_eq!(rig.chain(), Ok(arm));
     Effect::new(Kind::SegmentLength, 2)

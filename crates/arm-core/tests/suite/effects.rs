@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, Kind, Local, Motion, resisting_torque};
 use arm_core::{
     Chain, Contact, Displaced, Joints, Load, Pose, Reading, Segment, Setup, Wave, forward_dynamics,
-    gravity, inverse_dynamics, models,
+    gravity, inverse_dynamics, sample_arms,
 };
 
 use crate::common::Random;
@@ -246,7 +246,7 @@ fn springs_return_their_energy() {
 
 #[test]
 fn a_positive_muscle_torque_lifts_the_arm() {
-    let arm = models::mechanical_arm();
+    let arm = sample_arms::mechanical_arm();
     let pose = Pose::new(&Joints::zeros());
     for effect in [
         of("voluntary", &[3.0, 0.0, 2.0]),
@@ -266,7 +266,7 @@ fn a_positive_muscle_torque_lifts_the_arm() {
 
 #[test]
 fn rotor_inertia_is_counted_once() {
-    let arm = models::mechanical_arm();
+    let arm = sample_arms::mechanical_arm();
     let effect = Effect {
         index: 1,
         ..of("motor_inertia", &[0.5])

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use arm_core::effect::{Effect, Kind, Motion};
 use arm_core::estimator::{Estimator, Sample, SampleStatus, Settings};
-use arm_core::{Equation, Joints, Measured, models};
+use arm_core::{Equation, Joints, Measured, sample_arms};
 
 use crate::common::Random;
 
@@ -29,7 +29,7 @@ fn equation() -> Arm {
         Effect::new(Kind::Elastic, 1).with(&[0.8, 1.1]),
         Effect::new(Kind::Elastic, 2).with(&[0.5, 0.05]),
     ];
-    Equation::new(models::human_arm(), effects).expect("an arm")
+    Equation::new(sample_arms::human_arm(), effects).expect("an arm")
 }
 
 fn truth(arm: &Arm) -> [f64; 18] {

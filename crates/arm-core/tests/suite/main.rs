@@ -8,6 +8,8 @@ mod catalogue;
 mod chain;
 mod common;
 mod contact;
+#[cfg(feature = "custom-effects")]
+mod custom_effect;
 mod declared;
 mod dual;
 mod effects;
@@ -17,8 +19,6 @@ mod lanes;
 mod monitor;
 mod newton_euler;
 mod online;
-#[cfg(feature = "own")]
-mod own;
 mod pendulum;
 mod robot;
 mod scalar;

@@ -1,6 +1,6 @@
 //! The safety monitor: every fault is seen within two control periods, and nothing else is.
 
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Reason, Stop, Times};
+use arm_core::monitor::{Monitor, MonitoredChannel, Observation, Quantity, Reason, Stop, Times};
 use arm_core::{Invalid, Joints, Limits, Path, Real, Shape};
 
 use crate::common::Random;
@@ -13,14 +13,14 @@ const OLDEST: u64 = PERIOD;
 const FROZEN: u64 = 20_000;
 
 /// Angle, speed, acceleration, force and power of one joint.
-fn channels<T: Real>() -> [Channel<T>; 5] {
+fn channels<T: Real>() -> [MonitoredChannel<T>; 5] {
     let of = T::of;
     [
-        Channel::range(Quantity::Angle, of(-1.5), of(1.5)).frozen_after(FROZEN),
-        Channel::magnitude(Quantity::Speed, of(2.0)),
-        Channel::magnitude(Quantity::Acceleration, of(10.0)),
-        Channel::magnitude(Quantity::Force, of(110.0)).frozen_after(FROZEN),
-        Channel::magnitude(Quantity::Power, of(60.0)),
+        MonitoredChannel::range(Quantity::Angle, of(-1.5), of(1.5)).frozen_after(FROZEN),
+        MonitoredChannel::magnitude(Quantity::Speed, of(2.0)),
+        MonitoredChannel::magnitude(Quantity::Acceleration, of(10.0)),
+        MonitoredChannel::magnitude(Quantity::Force, of(110.0)).frozen_after(FROZEN),
+        MonitoredChannel::magnitude(Quantity::Power, of(60.0)),
     ]
 }
 
@@ -269,7 +269,7 @@ fn a_loop_that_stalls_stops_the_device() {
 
 #[test]
 fn a_value_that_changes_too_fast_or_too_far_stops_the_device() {
-    let check = |channel: Channel<f64>, second: (u64, f64)| {
+    let check = |channel: MonitoredChannel<f64>, second: (u64, f64)| {
         let times = Times {
             oldest: PERIOD,
             period: 10 * PERIOD,
@@ -287,7 +287,7 @@ fn a_value_that_changes_too_fast_or_too_far_stops_the_device() {
             .check(&seen)
             .map_err(|stop| (stop.reason, stop.value, stop.limit))
     };
-    let open = Channel::magnitude(Quantity::Angle, 10.0);
+    let open = MonitoredChannel::magnitude(Quantity::Angle, 10.0);
     assert_eq!(check(open, (PERIOD, 9.0)), Ok(()));
     let slow = open.fastest(100.0);
     assert_eq!(check(slow, (PERIOD, 0.09)), Ok(()));
@@ -309,7 +309,7 @@ fn a_value_that_changes_too_fast_or_too_far_stops_the_device() {
 fn a_monitor_without_channels_or_period_is_refused() {
     let times = |period| Times { oldest: 0, period };
     assert!(Monitor::<f64, 0>::new([], times(1)).is_err());
-    let channel = Channel::magnitude(Quantity::Angle, 1.0);
+    let channel = MonitoredChannel::magnitude(Quantity::Angle, 1.0);
     assert!(Monitor::new([channel], times(0)).is_err());
     assert!(Monitor::new([channel.fastest(0.0)], times(1)).is_err());
     assert!(Monitor::new([channel.farthest(f64::NAN)], times(1)).is_err());
@@ -322,7 +322,8 @@ fn impossible_limits_are_refused() {
             oldest: 0,
             period: 1,
         };
-        Monitor::<f64, 1>::new([Channel::range(Quantity::Angle, min, max)], times).map(|_| ())
+        Monitor::<f64, 1>::new([MonitoredChannel::range(Quantity::Angle, min, max)], times)
+            .map(|_| ())
     };
     assert_eq!(refused(f64::NEG_INFINITY, f64::INFINITY), Ok(()));
     let nan = Err(Invalid::NotFinite {

@@ -6,7 +6,7 @@ use arm_core::effect::{ActsOn, Effect, KINDS, Kind, Motion, States, resisting_to
 use arm_core::estimator::{Decision, Estimator, Fault, Sample, SampleStatus, Settings};
 use arm_core::{
     Compensation, Equation, Invalid, Joints, Measured, Pose, Prior, gravity, inverse_dynamics,
-    joint_force, models, static_torque,
+    joint_force, sample_arms, static_torque,
 };
 
 use crate::common::Random;
@@ -31,7 +31,7 @@ fn typical() -> [Effect<f64>; 10] {
 fn equation() -> Equation<f64, 3, 18, 10> {
     let mut effects = typical();
     effects[9].on = false;
-    let arm = models::human_arm()
+    let arm = sample_arms::human_arm()
         .with_rotor_inertia([0.01, 0.0, 0.002])
         .expect("rotors");
     Equation::new(arm, effects).expect("an arm")
@@ -77,7 +77,7 @@ fn the_columns_times_the_unknowns_are_the_torque_that_a_motion_needs() {
 /// A device evaluates each law for a unit of its parameters, a simulation as a whole.
 #[test]
 fn a_device_resists_as_the_laws_say() {
-    let (arm, mut random) = (models::human_arm(), Random(27));
+    let (arm, mut random) = (sample_arms::human_arm(), Random(27));
     for &kind in KINDS.iter().filter(|k| k.acts_on() == ActsOn::Joints) {
         for _ in 0..100 {
             let effect: Effect<f64> = random.effect(kind, 1);
@@ -139,7 +139,7 @@ fn sample(equation: &Equation<f64, 3, 18, 10>, t: f64) -> Sample<f64, 3> {
 }
 
 fn settings() -> Settings<f64, 3> {
-    let mut settings = Settings::new(&models::human_arm(), 1e-3);
+    let mut settings = Settings::new(&sample_arms::human_arm(), 1e-3);
     settings.cutoff = 40.0;
     settings.noise = [0.005; 3];
     settings
@@ -150,7 +150,7 @@ fn started(settings: &Settings<f64, 3>) -> Estimator<f64, 3, 18, 10> {
     effects[9].on = false;
     // Relaxation needs its state: it is left out of what is to be found exactly.
     effects[8].on = false;
-    let equation = Equation::new(models::human_arm(), effects).expect("an arm");
+    let equation = Equation::new(sample_arms::human_arm(), effects).expect("an arm");
     let mut priors = equation.priors(0.1);
     for (i, prior) in priors.iter_mut().enumerate().take(equation.used()) {
         prior.mean = if i < 6 { 1.08 * prior.mean } else { 0.0 };
@@ -165,7 +165,7 @@ fn exact_data_give_the_truth_from_a_wrong_start() {
     let mut source = typical();
     source[8].on = false;
     source[9].on = false;
-    let equation = Equation::new(models::human_arm(), source).expect("an arm");
+    let equation = Equation::new(sample_arms::human_arm(), source).expect("an arm");
     for k in 0..20_000 {
         online.update(Some(&sample(&equation, f64::from(k) * 1e-3)));
     }
@@ -331,7 +331,7 @@ fn impossible_settings_and_priors_are_refused() {
         "standard deviation of unknown"
     );
     assert_eq!(named(refused(&|_, p| p[3].max = -1.0)), "bound of unknown");
-    let narrow = Equation::<f64, 3, 8, 10>::new(models::human_arm(), typical());
+    let narrow = Equation::<f64, 3, 8, 10>::new(sample_arms::human_arm(), typical());
     assert_eq!(named(narrow.expect_err("too many")), "number of unknowns");
 }
 

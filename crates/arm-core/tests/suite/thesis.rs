@@ -2,7 +2,7 @@
 
 use arm_core::{
     Chain, JointMatrix, Joints, Pose, Segment, coriolis, coriolis_matrix, gravity, inertia,
-    jacobian, models, static_torque,
+    jacobian, sample_arms, static_torque,
 };
 
 use crate::common::Random;
@@ -206,7 +206,7 @@ fn printed_equations_fail_the_same_check() {
 /// Erratum 1: 0.0061 kg m² or 1.05 % of b11 for the arm of table 4.10, too little to be seen with a loose tolerance.
 #[test]
 fn size_of_the_misprint_in_equation_3_4() {
-    let chain = models::human_arm();
+    let chain = sample_arms::human_arm();
     let arm = Arm::of(&chain);
     let q = degrees([-40.0, 50.0, 10.0]);
     let right = inertia(&chain, &Pose::new(&q))[(0, 0)];
@@ -223,7 +223,7 @@ fn size_of_the_misprint_in_equation_3_4() {
 /// Erratum 2: the torques of the worked example.
 #[test]
 fn size_of_the_misprint_in_equation_3_6() {
-    let chain = models::human_arm();
+    let chain = sample_arms::human_arm();
     let arm = Arm::of(&chain);
     let (q, qd) = (
         degrees([-40.0, 50.0, 10.0]),
@@ -245,7 +245,7 @@ fn size_of_the_misprint_in_equation_3_6() {
 /// Erratum 3: −0.715 for +0.715 N m at F = (5, 10) N.
 #[test]
 fn size_of_the_misprint_in_equation_3_10() {
-    let chain = models::human_arm();
+    let chain = sample_arms::human_arm();
     let arm = Arm::of(&chain);
     let q = degrees([-40.0, 50.0, 10.0]);
     let right = static_torque(&chain, &Pose::new(&q), [5.0, 10.0], 0.0);
@@ -257,7 +257,7 @@ fn size_of_the_misprint_in_equation_3_10() {
 /// The centrifugal terms come from off-diagonal entries of C (erratum 18): no diagonal entry gives a squared speed.
 #[test]
 fn diagonal_of_c_holds_no_squared_speed() {
-    let chain = models::human_arm();
+    let chain = sample_arms::human_arm();
     let q = degrees([-40.0, 50.0, 10.0]);
     for k in 0..3 {
         let qd = Joints::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use arm_core::effect::{Effect, Kind, Local, MAX_STATES, Nature, Part, Place, Values};
-use arm_core::{Contact, Setup, models};
+use arm_core::{Contact, Setup, sample_arms};
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
@@ -70,7 +70,7 @@ impl Library {
     fn of<const N: usize>(
         prepared: &PreparedSession<N>,
         point: &LinearizationPoint<N>,
-        is_asked: impl Fn(Kind, usize) -> bool,
+        is_tested: impl Fn(Kind, usize) -> bool,
         waves: &[[f64; 2]],
     ) -> Result<Self, GapError> {
         let hypothesis = &point.hypothesis;
@@ -78,12 +78,13 @@ impl Library {
         let mut candidates = Vec::new();
         for kind in prepared.session.kinds() {
             // What the passive base has is no question any more.
-            let new = |&i: &usize| is_asked(kind, i) && !prepared.has_in_base(kind, i);
+            let new = |&i: &usize| is_tested(kind, i) && !prepared.has_in_base(kind, i);
             for index in places(prepared.session, kind).filter(new) {
                 for part in kind.prior().parts.iter().enumerate() {
                     let mut plain = Effect::new(kind, index);
                     hypothesis.share_rest(&mut plain);
-                    let mut own = ask(prepared.session, &motions, plain, part, waves);
+                    let mut own =
+                        candidates_of_part(prepared.session, &motions, plain, part, waves);
                     // Without repeats a shape cannot be distinguished from other errors of the model: it stays at its initial value.
                     if !prepared.repeated && !kind.prior().nature.swings() {
                         own.iter_mut().for_each(|c| c.keep_shapes(part.1));
@@ -204,7 +205,10 @@ fn places<const N: usize>(session: &Session<N>, kind: Kind) -> std::ops::Range<u
 
 /// Whether a kind changes the length of a segment.
 fn lengthens(kind: Kind) -> bool {
-    let mut setup = Setup::new(&models::mechanical_arm(), Contact::new([1.0; 2], [0.0; 2]));
+    let mut setup = Setup::new(
+        &sample_arms::mechanical_arm(),
+        Contact::new([1.0; 2], [0.0; 2]),
+    );
     let before = setup.segments[0].length;
     let mut effect = Effect::<f64>::new(kind, 0);
     effect.parameters[0] = 0.5;
@@ -238,7 +242,7 @@ fn holds_at_rest(kind: Kind) -> bool {
 /// The candidates of one question: a part of a kind at a place.
 ///
 /// * `plain` - the effect, with what it shares with others in its place
-fn ask<const N: usize>(
+fn candidates_of_part<const N: usize>(
     session: &Session<N>,
     movements: &[Movement<N>],
     mut plain: Effect<f64>,

@@ -1,4 +1,4 @@
-//! Shapes that a fit refines, and their limits: a law whose shape lies beyond what the trials can show is another, plainer law there.
+//! Shape parameters that a fit refines, and their limits: beyond the range that the trials resolve, a law equals a simpler one.
 
 use arm_core::effect::{Effect, Nature, Part};
 use arm_ident::regression::trial::Trial;

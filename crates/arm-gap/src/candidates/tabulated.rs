@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use arm_core::effect::{Info, Local, MAX_PARAMETERS, OwnLaw, Parameters, Prior};
+use arm_core::effect::{CustomLaw, Info, Local, MAX_PARAMETERS, Parameters, Prior};
 
 /// Number of tables that are kept: a fit returns to shapes it has tried.
 const MOST_TABLES: usize = 24;
@@ -83,7 +83,7 @@ pub type Tabulate = Box<dyn Fn(&[f64]) -> Option<Vec<Vec<f64>>> + Send + Sync>;
 type Key = [u64; MAX_PARAMETERS];
 type Tables = Arc<Vec<Vec<f64>>>;
 
-/// A law of one's own by its tables.
+/// A user-defined law by its tables.
 pub struct Tabulated {
     info: &'static Info,
     prior: Prior,
@@ -150,7 +150,7 @@ impl Tabulated {
     }
 }
 
-impl OwnLaw for Tabulated {
+impl CustomLaw for Tabulated {
     fn info(&self) -> &'static Info {
         self.info
     }
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_that_failed_once_is_asked_again() {
+    fn a_law_that_failed_once_is_evaluated_again() {
         let good = law().tabulate;
         let first = std::sync::atomic::AtomicBool::new(true);
         let once = move |p: &[f64]| {
@@ -274,14 +274,14 @@ mod tests {
     }
 
     #[test]
-    fn a_law_may_ask_for_another_one() {
+    fn a_law_may_evaluate_another_one() {
         let inner: &'static Tabulated = Box::leak(Box::new(law()));
         let good = law().tabulate;
-        let asks = move |p: &[f64]| {
+        let nested = move |p: &[f64]| {
             let torque = inner.torque(&[1.0, 0.0, 0.2, 0.0, 0.0, 0.0], &Local::moving(0.0, 0.0));
             good(p).filter(|_| torque == 0.0)
         };
-        let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(asks));
+        let law = Tabulated::new(&INFO, Prior::FIRST, GRID, Box::new(nested));
         let p = [1.0, 0.0, 0.5, 0.0, 0.0, 0.0];
         assert!((law.torque(&p, &Local::moving(1.0, 0.0)) - libm::sin(2.0)).abs() < 1e-6);
     }

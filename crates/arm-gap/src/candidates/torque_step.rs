@@ -1,4 +1,4 @@
-//! How large a change is with which the response to a torque is taken: small beside what the joint carries, and not lost in rounding.
+//! Step of the difference quotient in a torque: small beside the load of the joint, and large beside rounding.
 
 use arm_core::effect::{Effect, MAX_STATES, Motion, advance_states, resisting_torque};
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};

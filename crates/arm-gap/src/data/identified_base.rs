@@ -1,4 +1,4 @@
-//! The laws of joints that the model leaves without one, as measured motion has them.
+//! Laws of joints that the model leaves without one, identified from the measured motion.
 //!
 //! A rigid model of literature values cannot follow a person: its free wrist falls. What every passive joint may have, springs with
 //! a rest angle, viscosity and dry friction ([`arm_core::effect::Prior::passive`]), is linear in the equation of motion, and is
@@ -160,9 +160,9 @@ impl<const N: usize> Session<N> {
                 continue;
             }
             let (joint, chain) = (own[0].0.index, &found.chain);
-            let asked = model.fitted.iter().filter(|law| law.index == joint);
-            let asked: Vec<_> = asked.copied().collect();
-            if let Some(alone) = laws_in_motion(chain, &moving, (joint, &asked, friction)) {
+            let laws = model.fitted.iter().filter(|law| law.index == joint);
+            let laws: Vec<_> = laws.copied().collect();
+            if let Some(alone) = laws_in_motion(chain, &moving, (joint, &laws, friction)) {
                 own.copy_from_slice(&alone);
             }
         }

@@ -135,8 +135,8 @@ impl Moving {
     fn best(&self, laws: &[Effect<f64>]) -> Option<Vec<WithStd>> {
         let fits = (1..1_usize << laws.len()).filter_map(|subset| {
             let own: Vec<usize> = (0..laws.len()).filter(|l| subset >> l & 1 == 1).collect();
-            let asked: Vec<_> = own.iter().map(|&l| laws[l]).collect();
-            let found = self.fit(&asked)?;
+            let included: Vec<_> = own.iter().map(|&l| laws[l]).collect();
+            let found = self.fit(&included)?;
             let possible = found.laws.iter().all(|(law, _)| law.parameters[0] >= 0.0);
             possible.then_some((own, found))
         });

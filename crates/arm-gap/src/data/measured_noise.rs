@@ -1,4 +1,4 @@
-//! The noise of a session, read off what its repeats differ by or off what a hypothesis leaves.
+//! Estimation of the noise of a session, from deviations between repeats or from the residuals of a hypothesis.
 
 use std::sync::Arc;
 
@@ -78,8 +78,8 @@ impl<const N: usize> PreparedSession<'_, N> {
         if deviations.is_empty() {
             return Ok(());
         }
-        let (range, told) = (self.ranges(&point.residuals), self.observed_share());
-        let noise = self.noise_of((&deviations, &taken), &shifts, (&range, &told))?;
+        let (range, observable_share) = (self.ranges(&point.residuals), self.observed_share());
+        let noise = self.noise_of((&deviations, &taken), &shifts, (&range, &observable_share))?;
         self.noise = noise.weighed(&self.courses);
         Ok(())
     }
@@ -104,11 +104,11 @@ impl<const N: usize> PreparedSession<'_, N> {
             .iter()
             .map(|&t| self.valid_segments[t].len())
             .sum();
-        let told = self
+        let counts = self
             .fitted
             .iter()
             .map(|&t| self.valid_segments[t].rows_per_channel(channels));
-        let sum = told.fold(vec![0; channels], |sum, own| {
+        let sum = counts.fold(vec![0; channels], |sum, own| {
             std::iter::zip(sum, own).map(|(a, b)| a + b).collect()
         });
         sum.into_iter()
@@ -124,7 +124,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         &self,
         (deviations, fitted): (&[Thinned], &[Thinned]),
         shifts: &[Arc<Vec<Thinned>>],
-        (range, told): (&[f64], &[f64]),
+        (range, observable_share): (&[f64], &[f64]),
     ) -> Result<Noise, GapError> {
         /// Alternations: the noise weights the fit of the shifts of trials, and residuals without the shifts give the noise.
         const ITERATIONS: usize = 3;
@@ -138,7 +138,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         // there the noise of speeds makes all that resists too small.
         let apart = self.session.compares_contact_torques();
         let of = |deviations: &[Thinned], taken: &[Thinned]| {
-            let noise = Noise::of(deviations, taken, range, told)?;
+            let noise = Noise::of(deviations, taken, range, observable_share)?;
             Ok::<_, GapError>(if apart { noise.uncorrelated() } else { noise })
         };
         let mut noise = of(deviations, fitted)?;

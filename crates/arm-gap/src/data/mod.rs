@@ -1,15 +1,15 @@
-//! What was measured, made ready: session, repeats, the samples that are compared, noise.
+//! Measured data, prepared: session, repeats, the samples that are compared, noise.
 
 pub mod identified_base;
 mod joint_in_motion;
 mod measured_noise;
 pub mod noise;
+pub(crate) mod noise_without_repeats;
 pub mod passive_law;
 pub mod prepared_session;
-mod repeated;
+mod repeat_deviations;
 pub mod repeats;
-mod rest;
+mod resting_joints;
 pub mod session;
-pub(crate) mod unrepeated;
 pub mod valid_segments;
 pub mod whitening;

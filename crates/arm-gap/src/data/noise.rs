@@ -1,4 +1,4 @@
-//! The noise of a data set, from what differs between repeats of one movement, and the rows that it leaves white.
+//! The noise of a data set, from deviations between repeats of one movement, and rows whitened with it.
 //!
 //! Residuals of filtered samples are never white. Each channel is an autoregression in time, the innovations of the
 //! channels are correlated; both are read off repeats, where the model's errors cancel. Without repeats the residual of a
@@ -108,7 +108,7 @@ impl Noise {
     /// * `deviations` - of each trial, already scaled for the freedom that their mean took
     /// * `taken` - the like, whose products add up to the covariance of what was taken out of them and may have been noise
     /// * `range` - size of each channel, a share of which is the floor of the noise
-    /// * `told` - share of the samples of each channel that are observable; the others are zero
+    /// * `observable_share` - share of the samples of each channel that are observable; the others are zero
     ///
     /// # Errors
     /// [`GapError::Numerics`] for series too short.
@@ -116,7 +116,7 @@ impl Noise {
         deviations: &[Thinned],
         taken: &[Thinned],
         range: &[f64],
-        told: &[f64],
+        observable_share: &[f64],
     ) -> Result<Self, GapError> {
         let channels = range.len();
         let mut whiteners = Vec::with_capacity(channels);
@@ -133,7 +133,7 @@ impl Noise {
                 let longest = series.iter().map(|s| s.len()).max().unwrap_or(0);
                 let order = ORDER.min(longest.saturating_sub(2));
                 let mut model = AutoRegression::selected_about_zero(&series, &taken, order)?;
-                model.sd /= told[c].max(1e-6).sqrt();
+                model.sd /= observable_share[c].max(1e-6).sqrt();
                 model
             } else {
                 AutoRegression {
@@ -155,7 +155,7 @@ impl Noise {
         }
         for a in 0..channels {
             for b in 0..channels {
-                let both = count as f64 * f64::min(told[a], told[b]);
+                let both = count as f64 * f64::min(observable_share[a], observable_share[b]);
                 correlation[a * channels + b] /= f64::max(both, 1.0);
             }
             // The floor of white noise is independent between channels.
@@ -191,7 +191,7 @@ impl Noise {
     pub fn without_repeats(
         deviations: &[Vec<Vec<f64>>],
         range: &[f64],
-        (told, weights): (&[f64], Vec<Channels>),
+        (observable_share, weights): (&[f64], Vec<Channels>),
     ) -> Result<Self, GapError> {
         let mut noise = Self {
             weights,
@@ -201,8 +201,8 @@ impl Noise {
             let (mut square, mut count, mut effective) = (0.0, 0.0, 0.0);
             for series in deviations {
                 square += dot(&series[c], &series[c]);
-                count += told[c] * series[c].len() as f64;
-                effective += told[c] * effective_samples(&series[c])?.max(1.0);
+                count += observable_share[c] * series[c].len() as f64;
+                effective += observable_share[c] * effective_samples(&series[c])?.max(1.0);
             }
             let variance = square / f64::max(count, 1.0) * count / f64::max(effective, 1.0);
             let model = AutoRegression {
@@ -285,7 +285,7 @@ impl Noise {
         let n = self.whiteners.len();
         // From the last channel up: each row needs those before it unmixed.
         for c in (0..n).rev() {
-            for i in (0..rows[c].len()).filter(|&i| whitening.is_told((c, i))) {
+            for i in (0..rows[c].len()).filter(|&i| whitening.is_observable((c, i))) {
                 rows[c][i] = (0..=c).fold(0.0, |s, b| s + self.mix[c * n + b] * rows[b][i]);
             }
         }

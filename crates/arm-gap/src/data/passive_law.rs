@@ -1,4 +1,4 @@
-//! A law that a joint may have which the model leaves without one.
+//! A law of a joint that the model leaves without one.
 
 use arm_core::effect::Effect;
 

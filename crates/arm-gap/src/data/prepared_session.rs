@@ -1,4 +1,4 @@
-//! A session made ready: every trial's course, which trials repeat each other, and the noise.
+//! A prepared session: the course of every trial, the groups of repeats, and the noise.
 
 use std::sync::{Arc, Mutex};
 
@@ -23,7 +23,7 @@ pub(crate) struct Rest {
     /// Samples that are left out.
     pub left_out: Vec<bool>,
     /// Observable force where it is not both components.
-    pub told: Arc<Vec<ObservableForce>>,
+    pub observable: Arc<Vec<ObservableForce>>,
     /// By joint, where it rests in a measured motion; nothing is listed where the motion is simulated.
     pub joints: Vec<Vec<bool>>,
 }
@@ -197,13 +197,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let trial = &self.session.trials[i];
             let rest = self.resting.get(self.group_of[i]).cloned();
             let Rest {
-                mut left_out, told, ..
+                mut left_out,
+                observable,
+                ..
             } = rest.unwrap_or_default();
             left_out.resize(trial.len(), false);
             for (k, flag) in left_out.iter_mut().enumerate() {
                 *flag |= self.is_left_out(i, k as f64 / trial.rate);
             }
-            self.valid_segments[i] = ValidSegments::of(trial, &self.courses[i], &left_out, told);
+            self.valid_segments[i] =
+                ValidSegments::of(trial, &self.courses[i], &left_out, observable);
         }
         let kept: Vec<usize> = self
             .session

@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn the_force_of_a_led_arm_is_read_whether_or_not_torques_were_recorded_beside_it() {
         let mut session = resting(100.0);
-        let asked = |session: &Session<2>| {
+        let properties = |session: &Session<2>| {
             let torques = session.compares_contact_torques();
             (
                 session.reads_contact(),
@@ -303,16 +303,16 @@ mod tests {
                 session.by_trial().len(),
             )
         };
-        let led = asked(&session);
+        let led = properties(&session);
         assert!(led.0 && !led.1);
         session.comparison = ComparisonMode::Torque;
         // Of a contact alone the same sensors are read; where the robot's base stands is no question.
-        assert_eq!(asked(&session), (true, true, led.2, led.3 - 2));
+        assert_eq!(properties(&session), (true, true, led.2, led.3 - 2));
         session.trials[0].torque = Some(vec![arm_core::Joints::zeros(); 200]);
         // Angle sensors alone.
-        assert_eq!(asked(&session), (false, false, 2, 0));
+        assert_eq!(properties(&session), (false, false, 2, 0));
         session.comparison = ComparisonMode::Led;
-        assert_eq!(asked(&session), led);
+        assert_eq!(properties(&session), led);
     }
 
     #[test]

@@ -310,13 +310,13 @@ mod tests {
 
     #[test]
     fn where_a_joint_rests_one_component_of_the_force_is_compared_or_none() {
-        let mut told = vec![ObservableForce::Both; 8];
-        told[1] = ObservableForce::Along([0.6, 0.8]);
-        told[2] = ObservableForce::Neither;
+        let mut observable = vec![ObservableForce::Both; 8];
+        observable[1] = ObservableForce::Along([0.6, 0.8]);
+        observable[2] = ObservableForce::Neither;
         let segments = ValidSegments {
             samples: (0..8).collect(),
             step: 1,
-            observable: Arc::new(told),
+            observable: Arc::new(observable),
         };
         assert_eq!(segments.rows_per_channel(3), [8, 7, 6]);
         let picked = segments.pick(&vec![vec![1.0; 8], vec![10.0; 8], vec![20.0; 8]]);

@@ -36,7 +36,7 @@ enum Row {
     /// It is predicted from samples: channel, sample, factor; with one over the standard deviation of the error.
     From(Vec<(usize, usize, f64)>, f64),
     /// It is not observable.
-    Untold,
+    Unobserved,
 }
 
 /// How the samples of a trial are made white, channel by channel.
@@ -70,7 +70,7 @@ impl Whitening {
                 Some(component) => match (observed.force_at(t), component) {
                     (ObservableForce::Both, _) => known.row((c, t), None),
                     (ObservableForce::Along(unit), 0) => known.row((c, t), Some(unit)),
-                    _ => Row::Untold,
+                    _ => Row::Unobserved,
                 },
             };
             (0..place.len()).map(row).collect()
@@ -82,8 +82,8 @@ impl Whitening {
     }
 
     /// Whether a sample of a channel is observable.
-    pub fn is_told(&self, (channel, sample): (usize, usize)) -> bool {
-        !matches!(self.rows[channel][sample], Row::Untold)
+    pub fn is_observable(&self, (channel, sample): (usize, usize)) -> bool {
+        !matches!(self.rows[channel][sample], Row::Unobserved)
     }
 
     /// Makes channels white in place.
@@ -92,7 +92,7 @@ impl Whitening {
             // Backwards, so that every sample still finds its unfiltered past; a component of the force finds both in it, since that
             // stands in the channel which is made white first.
             for (t, row) in rows.iter().enumerate().rev() {
-                let (foretold, inverse) = match row {
+                let (predicted, inverse) = match row {
                     Row::Next(count) => {
                         let (factors, inverse) = self.whiteners[c].next(*count);
                         let past = channels[c][..t].iter().rev();
@@ -105,9 +105,9 @@ impl Whitening {
                             .fold(0.0, |s, &(c, i, a)| s + a * channels[c][i]);
                         (sum, *inverse)
                     }
-                    Row::Untold => (0.0, 0.0),
+                    Row::Unobserved => (0.0, 0.0),
                 };
-                channels[c][t] = (channels[c][t] - foretold) * inverse;
+                channels[c][t] = (channels[c][t] - predicted) * inverse;
             }
         }
     }
@@ -128,13 +128,13 @@ impl Known<'_> {
     fn row(&mut self, (c, t): (usize, usize), along: Option<Plane<f64>>) -> Row {
         let model = along.map_or(c, |unit| self.louder((c, c + 1), unit));
         let order = self.whiteners[model].order();
-        let told = |i: &usize| match self.observed.force_at(*i) {
+        let is_observed = |i: &usize| match self.observed.force_at(*i) {
             _ if !self.is_force(c) => true,
             ObservableForce::Both => true,
             ObservableForce::Along(_) => along.is_some(),
             ObservableForce::Neither => false,
         };
-        let past: Vec<usize> = (0..t).rev().filter(told).take(order).collect();
+        let past: Vec<usize> = (0..t).rev().filter(is_observed).take(order).collect();
         let lags: Vec<usize> = past
             .iter()
             .map(|&i| self.place[t] - self.place[i])
@@ -216,12 +216,12 @@ mod tests {
         };
         let whitening = Whitening::new(&[slow(1.0), slow(1.0)], observed);
         let values = |c: usize| {
-            let told = |f: &ObservableForce| match (f, c) {
+            let observable = |f: &ObservableForce| match (f, c) {
                 (ObservableForce::Both, _) => column[c],
                 (ObservableForce::Along(u), 0) => u[0] * column[0] + u[1] * column[1],
                 _ => 0.0,
             };
-            force.iter().map(told).collect::<Vec<f64>>()
+            force.iter().map(observable).collect::<Vec<f64>>()
         };
         let mut channels = vec![values(0), values(1)];
         whitening.apply(&mut channels);

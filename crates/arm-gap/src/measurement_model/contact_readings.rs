@@ -1,4 +1,4 @@
-//! What the sensors of hand and contact read where joint torques are compared, and what a hypothesis makes of it.
+//! Readings of the sensors at hand and contact where joint torques are compared, corrected under a hypothesis.
 //!
 //! The measured torque of a contact is `J(q)ᵀ F` of the readings of angle and force sensors. Errors of the readings, and a displaced
 //! handle, are part of the prediction: the torque of the readings minus that of the angles and forces of a hypothesis.

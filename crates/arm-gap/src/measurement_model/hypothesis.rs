@@ -171,7 +171,7 @@ impl<const N: usize> Hypothesis<N> {
     }
 
     /// The segments of the hypothesis.
-    pub fn believed(&self, nominal: &[Segment<f64>; N]) -> [Segment<f64>; N] {
+    pub fn changed_segments(&self, nominal: &[Segment<f64>; N]) -> [Segment<f64>; N] {
         core::array::from_fn(|k| {
             let [mass, com, inertia] = self.segments[k].map(|change| 1.0 + change);
             let mut segment = nominal[k];
@@ -195,7 +195,7 @@ impl<const N: usize> Hypothesis<N> {
             contact.stiffness[axis] /= 1.0 + self.contact[0][axis];
             contact.damping[axis] *= 1.0 + self.contact[1][axis];
         }
-        let segments = self.believed(nominal.segments());
+        let segments = self.changed_segments(nominal.segments());
         let chain = Chain::new(segments, nominal.base(), nominal.gravity())?
             .with_rotor_inertia(*nominal.rotor_inertia())?;
         let mut setup = Setup::new(&chain, contact);

@@ -1,4 +1,4 @@
-//! A hypothesis as it is in one trial: where the handle is there, in the hand and in the room, and the phase that a rhythm is in.
+//! A hypothesis in one trial: the place of the handle in the hand and in space, and the phase of each rhythm.
 //!
 //! Neither is the same from one trial to the next, so they are estimated from each trial alone,
 //! whatever its role and hypothesis: two numbers each for the handle, as far as what is declared of it lets them
@@ -183,12 +183,12 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
 
 impl<const N: usize> PreparedSession<'_, N> {
     /// A hypothesis and rhythms as they are in every trial, whatever its role; as they were where one cannot be simulated.
-    pub fn in_trials(&self, believed: (&Hypothesis<N>, &[Effect<f64>])) -> Vec<Hypothesis<N>> {
+    pub fn in_trials(&self, hypothesis: (&Hypothesis<N>, &[Effect<f64>])) -> Vec<Hypothesis<N>> {
         let one = |trial: usize| {
-            let own = self.session.in_trial(believed, &self.courses[trial]);
+            let own = self.session.in_trial(hypothesis, &self.courses[trial]);
             own.unwrap_or_else(|_| {
-                let mut all = believed.0.clone();
-                all.named.extend_from_slice(believed.1);
+                let mut all = hypothesis.0.clone();
+                all.named.extend_from_slice(hypothesis.1);
                 all
             })
         };

@@ -33,7 +33,7 @@ impl<const N: usize> Session<N> {
         let mut channels = vec![Vec::with_capacity(course.times.len()); N];
         for (i, &time) in course.times.iter().enumerate() {
             let (q, qd, qdd) = true_motion(hypothesis, motion, i);
-            let chain = motion.felt(&arm, i);
+            let chain = motion.chain_in_moving_frame(&arm, i);
             let q = q - offset;
             let pose = Pose::new(&q);
             let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);
@@ -111,7 +111,7 @@ pub(crate) fn offsets<const N: usize>(effects: &[Effect<f64>]) -> Joints<f64, N>
 #[cfg(test)]
 mod tests {
     use arm_core::effect::Kind;
-    use arm_core::{Contact, Placement, Plane, Setup, jacobian, models};
+    use arm_core::{Contact, Placement, Plane, Setup, jacobian, sample_arms};
     use arm_ident::regression::trial::Trial;
 
     use nalgebra::Vector3;
@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn a_hypothesis_with_the_faults_of_the_sensors_explains_what_they_read_of_a_contact() {
         const RATE: f64 = 100.0;
-        let chain = models::mechanical_arm();
+        let chain = sample_arms::mechanical_arm();
         let faults = [
             Effect::new(Kind::AngleOffset, 1).with(&[0.05]),
             Effect::new(Kind::ForceBias, 1).with(&[-4.0]),
@@ -175,12 +175,12 @@ mod tests {
             let mut hypothesis = session.given();
             hypothesis.named = faults.to_vec();
             hypothesis.placement = placement;
-            let told = session.torques(&hypothesis, &course).expect("torques");
+            let computed = session.torques(&hypothesis, &course).expect("torques");
             // Away from the ends, where the motion is filtered.
             let apart = |j: usize| (100..500).map(move |i| (i, j)).collect::<Vec<_>>();
             let each = (0..2)
                 .flat_map(apart)
-                .map(|(i, j)| (told[j][i] - course.raw[j][i]).abs());
+                .map(|(i, j)| (computed[j][i] - course.raw[j][i]).abs());
             each.fold(0.0, f64::max)
         };
         assert!(left(&faults, place) < 2e-3, "{}", left(&faults, place));

@@ -1,8 +1,8 @@
-//! What the channels would read if a hypothesis were true.
+//! Predicted readings of the channels under a hypothesis.
 
 mod base_path;
-mod compared;
 mod contact_readings;
+mod gap_channels;
 mod handle_path;
 pub mod hypothesis;
 pub mod in_trial;

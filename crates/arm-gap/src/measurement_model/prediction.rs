@@ -1,4 +1,4 @@
-//! What the channels would read if a hypothesis were true.
+//! Predicted readings of the channels along a trial under a hypothesis.
 
 use arm_core::effect::{Effect, Motion, Place, resisting_besides_dry};
 use arm_core::{Joints, Plane, Pose, inverse_dynamics, joint_force, static_torque};
@@ -456,7 +456,7 @@ fn friction_limit<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use arm_core::{Chain, Contact, models};
+    use arm_core::{Chain, Contact, sample_arms};
     use arm_ident::regression::trial::Tolerance;
 
     use super::*;
@@ -470,7 +470,7 @@ pub(crate) mod tests {
             force_on_arm: Some(vec![[0.0; 2]; 200]),
             ..Trial::new(rate, vec![Joints::zeros(); 200])
         };
-        of_one(models::mechanical_arm(), trial)
+        of_one(sample_arms::mechanical_arm(), trial)
     }
 
     /// A session of one trial that an arm is led through.

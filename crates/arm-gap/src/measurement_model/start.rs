@@ -1,4 +1,4 @@
-//! Where a led arm starts: at rest, with the dry friction that follows from the measured force.
+//! The initial state of a led arm: at rest, with the dry friction that follows from the measured force.
 
 use arm_core::effect::{Effect, Kind, Motion, dry_friction, resisting_besides_dry};
 use arm_core::{
@@ -58,7 +58,7 @@ impl<const N: usize> Session<N> {
         }
         let setup = self.rig(hypothesis)?;
         let chain = setup.chain()?;
-        let force = felt_at_start(&effects, course);
+        let force = force_at_start(&effects, course);
         let handle = course.handle_at_start(hypothesis, &setup);
         let Some(hand) = hand_in_contact(&setup, handle, force) else {
             return Ok(q);
@@ -99,7 +99,7 @@ impl<const N: usize> Session<N> {
         }
         let setup = self.rig(hypothesis)?;
         let chain = setup.chain()?;
-        let force = felt_at_start(&effects, course);
+        let force = force_at_start(&effects, course);
         let pose = Pose::new(&q);
         let moment = Placement::of(&setup).map_or(0.0, |p| p.moment(&pose, force));
         let through = joint_force(&chain, &pose, (&zero, &zero), force);
@@ -176,7 +176,7 @@ impl<const N: usize> Course<N> {
 }
 
 /// Force on the arm at the start \[N\]: what is measured, without what effects in the sensors make of it.
-fn felt_at_start<const N: usize>(effects: &[Effect<f64>], course: &Course<N>) -> Plane<f64> {
+fn force_at_start<const N: usize>(effects: &[Effect<f64>], course: &Course<N>) -> Plane<f64> {
     let [y, z] = course.start_force;
     Sensing::of(effects).undone(0.0, [y, z, 0.0]).0
 }

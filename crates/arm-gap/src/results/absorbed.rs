@@ -1,3 +1,5 @@
+//! Imperfections of model and rig that were refitted, with their priors.
+
 use arm_core::effect::Kind;
 use arm_model::Effect;
 use serde::Serialize;
@@ -24,12 +26,12 @@ const RELATIVE: &str = "of its value";
 
 /// What was refitted of a model, from the unknowns of its fit.
 pub(super) fn absorbed<'c, const N: usize>(
-    asked: &SearchInput<'_>,
+    input: &SearchInput<'_>,
     hypothesis: &Hypothesis<N>,
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Vec<Absorbed> {
-    let modelled = asked.model.all_effects();
-    let given = (&modelled[..], asked.force_on_robot);
+    let modelled = input.model.all_effects();
+    let given = (&modelled[..], input.force_on_robot);
     let each = unknowns.filter_map(|c| absorbed_value(given, hypothesis, c));
     each.collect()
 }
@@ -37,12 +39,12 @@ pub(super) fn absorbed<'c, const N: usize>(
 /// A warning of what was refitted as far as it may be, beyond what was promised of it: what it could not take up may stand in what is
 /// named. `None` without any.
 pub(super) fn stopped<'c, const N: usize>(
-    asked: &SearchInput<'_>,
+    input: &SearchInput<'_>,
     hypothesis: &Hypothesis<N>,
     unknowns: impl Iterator<Item = &'c Coordinate>,
 ) -> Option<String> {
-    let modelled = asked.model.all_effects();
-    let given = (&modelled[..], asked.force_on_robot);
+    let modelled = input.model.all_effects();
+    let given = (&modelled[..], input.force_on_robot);
     let far = unknowns.filter(|c| c.is_at_limit(hypothesis.get(c.target)));
     let words: Vec<String> = far
         .filter_map(|c| absorbed_value(given, hypothesis, c))
@@ -156,7 +158,7 @@ mod tests {
 
     /// A viscosity of 0.1 that was refitted to 0.11 with a prior of 0.005: a tenth more, where twice a twentieth is the tolerance.
     #[test]
-    fn what_was_refitted_is_told_relative_to_what_was_promised() {
+    fn what_was_refitted_is_stated_relative_to_what_was_promised() {
         let model = "[[arm.segment]]\nlength = 0.5\nmass = 2.0\ncom = 0.2\ninertia = 0.02\n[[arm.joint]]\nviscosity = 0.1\n";
         let model = Model::from_toml(model).expect("a model");
         let mut known = model.core_effects();
@@ -187,18 +189,18 @@ mod tests {
             coordinate(Target::Known(1, 0), 1.0),
             coordinate(Target::Placement(0), 1.0),
         ];
-        let told = absorbed(&input(&model, false), &hypothesis, unknowns.iter());
-        let names: Vec<_> = told.iter().map(|a| a.name.as_str()).collect();
+        let found = absorbed(&input(&model, false), &hypothesis, unknowns.iter());
+        let names: Vec<_> = found.iter().map(|a| a.name.as_str()).collect();
         let expected = [
             "mass of segment 1",
             "place of the robot, z",
             "viscosity of viscous of joint 1",
         ];
         assert_eq!(names, expected);
-        assert_eq!((told[0].value, told[0].promised), (0.02, 0.1));
-        assert_eq!((told[1].unit.as_str(), told[1].value), ("m", 0.003));
-        assert!((told[2].value - 0.1).abs() < 1e-12 && (told[2].promised - 0.1).abs() < 1e-12);
-        assert_eq!(told[2].unit, RELATIVE);
+        assert_eq!((found[0].value, found[0].promised), (0.02, 0.1));
+        assert_eq!((found[1].unit.as_str(), found[1].value), ("m", 0.003));
+        assert!((found[2].value - 0.1).abs() < 1e-12 && (found[2].promised - 0.1).abs() < 1e-12);
+        assert_eq!(found[2].unit, RELATIVE);
 
         // No value is at its limit; then the place of the robot is, and alone is reported.
         assert_eq!(
@@ -213,12 +215,12 @@ mod tests {
             None
         );
         bounded[1].prior = Some((0.0, 0.001));
-        let told = stopped(&input(&model, false), &hypothesis, bounded.iter()).expect("a warning");
+        let found = stopped(&input(&model, false), &hypothesis, bounded.iter()).expect("a warning");
         assert!(
-            told.contains("place of the robot, z by 0.0030 m (prior ± 0.0020 m, 2 σ)."),
-            "{told}"
+            found.contains("place of the robot, z by 0.0030 m (prior ± 0.0020 m, 2 σ)."),
+            "{found}"
         );
-        assert!(!told.contains("mass"), "{told}");
+        assert!(!found.contains("mass"), "{found}");
     }
 
     #[test]
@@ -244,8 +246,8 @@ mod tests {
             step: 1e-3,
         };
         let bias = |on_robot| {
-            let told = absorbed(&input(&model, on_robot), &hypothesis, [unknown].iter());
-            told[0].value
+            let found = absorbed(&input(&model, on_robot), &hypothesis, [unknown].iter());
+            found[0].value
         };
         assert_eq!((bias(false), bias(true)), (0.3, -0.3));
     }

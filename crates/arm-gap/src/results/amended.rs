@@ -1,3 +1,5 @@
+//! The model with the fitted changes.
+
 use arm_model::{Contact, Effect, Joint, Model, Refused, Robot, Segment};
 use serde::Serialize;
 
@@ -137,9 +139,9 @@ mod tests {
     /// Ten per cent more mass, a contact half as stiff, a joint half as viscous.
     #[test]
     fn what_was_fitted_changes_the_model_that_was_given() {
-        use arm_model::{Channel, Site};
+        use arm_model::{ForceChannel, Site};
         let model = Model::from_toml(MODEL).expect("a model");
-        let (joint, channel) = (Site::Joint(0), Site::Channel(Channel::Fy));
+        let (joint, channel) = (Site::Joint(0), Site::Channel(ForceChannel::Fy));
         let fitted = Fitted {
             segments: vec![[0.1, 10.0, 0.0]],
             contact: [[1.0, 1.0], [0.5, 0.0]],

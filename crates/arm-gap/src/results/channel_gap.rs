@@ -1,9 +1,11 @@
+//! The gap of each channel on the test trials.
+
 use std::sync::Arc;
 
 use serde::Serialize;
 
 use super::Named;
-use super::simulated::{SimulatedTrial, Version, free_size, size};
+use super::simulated_trial::{SimulatedTrial, Version, free_size, size};
 use crate::selection::held_out::{Gap, Left, held_out};
 
 /// Where the gap of a channel is open on the test trials.

@@ -1,3 +1,5 @@
+//! The named effects, their alternatives, and movements that distinguish these.
+
 use arm_core::effect::{Effect as CoreEffect, Kind, Place as ActsOn};
 use arm_model::Effect;
 use serde::Serialize;
@@ -5,7 +7,7 @@ use serde::Serialize;
 use super::{Named, SearchInput, Value, at_most, placed};
 use crate::measurement_model::hypothesis::Target;
 use crate::selection::conclusion::Finding;
-use crate::selection::model_selection::{self, FittedAlternative, TIE};
+use crate::selection::model_selection::{self, FittedAlternative};
 use crate::trial_specific::component::TrialSpecific;
 
 /// A movement that would distinguish two explanations.
@@ -53,6 +55,8 @@ pub struct Alternative {
     pub free: Vec<usize>,
 }
 
+/// Difference of twice the log-likelihood up to which two laws explain the data as well: odds of 150.
+pub const TIE: f64 = model_selection::TIE;
 /// An alternative explains the data as well below so many units of twice the log-likelihood, and nearly as well up to [`TIE`].
 const AS_WELL: f64 = 2.0;
 /// It explains them better from so many on.
@@ -144,11 +148,11 @@ impl Missing {
     pub(super) fn named<const N: usize>(
         named: &model_selection::NamedEffect,
         finding: &Finding<N>,
-        asked: &SearchInput<'_>,
+        input: &SearchInput<'_>,
     ) -> Self {
         let effect = &finding.amended.hypothesis.named[named.slot];
         let info = effect.kind.info();
-        let own = sign_in_files(effect.kind, asked.force_on_robot);
+        let own = sign_in_files(effect.kind, input.force_on_robot);
         let precision = &finding.precision;
         let std = |p: usize| {
             let is_it = |c: Target| c == Target::Named(named.slot, p);
@@ -186,7 +190,7 @@ impl Missing {
     pub(super) fn trial_specific<const N: usize>(
         one: &TrialSpecific,
         finding: &Finding<N>,
-        asked: &SearchInput<'_>,
+        input: &SearchInput<'_>,
     ) -> Self {
         /// Parameters of time and speed, not of size.
         const SHAPES: [&str; 4] = ["frequency", "phase", "start", "duration"];
@@ -206,7 +210,7 @@ impl Missing {
                 (p.name.to_owned(), value)
             })
             .collect();
-        let trial = one.trial.map(|t| &asked.trials[t]);
+        let trial = one.trial.map(|t| &input.trials[t]);
         let (start, end) = one.span();
         if trial.is_some() {
             let start = || Value::of(start, None, "s", (0.0, 0.0));

@@ -4,24 +4,24 @@
 mod absorbed;
 mod amended;
 mod channel_gap;
+mod detection_limit;
 mod effect;
-mod found;
-mod limit;
+mod gap_result;
 mod root_mean_square;
 mod search_input;
-mod simulated;
+mod simulated_trial;
 mod value;
 mod verdict;
 
 pub use absorbed::Absorbed;
 pub use amended::Fitted;
 pub use channel_gap::{ChannelGap, Open, channel_names, confirmed};
-pub use effect::{Alternative, Missing, Place, Separation};
-pub use found::{GapResult, Lack, Screening};
-pub use limit::{Limit, SearchStep, Suspect, Tried};
+pub use detection_limit::{Limit, SearchStep, Suspect, Tried};
+pub use effect::{Alternative, Missing, Place, Separation, TIE};
+pub use gap_result::{GapResult, Lack, Screening};
 pub use root_mean_square::{pairwise_sum, root_mean_square};
 pub use search_input::{SearchInput, TrialFile};
-pub use simulated::{SimulatedTrial, Version, sizes};
+pub use simulated_trial::{SimulatedTrial, Version, sizes};
 pub use value::Value;
 pub use verdict::{Evidence, MISFIT, NEAR_NOISE, NEGLIGIBLE, Verdict};
 

@@ -1,3 +1,5 @@
+//! Root mean square with pairwise sums.
+
 /// Terms that are summed one after the other; longer sums are halved.
 const BLOCK: usize = 128;
 /// Running sums within a block.

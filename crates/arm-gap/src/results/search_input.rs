@@ -1,3 +1,5 @@
+//! The input of a search in the terms of the files.
+
 use arm_model::Model;
 
 /// A trial as its files have it.

@@ -1,3 +1,5 @@
+//! One parameter with its unit and interval.
+
 use serde::Serialize;
 
 use super::{at_least, at_most};

@@ -1,3 +1,5 @@
+//! The rule of the verdict.
+
 use serde::Serialize;
 
 /// Lack of fit from which on something is left, in standard deviations of white rows: coloured noise is never quite white, and

@@ -5,7 +5,7 @@ use arm_core::{Chain, Contact, Elbow, Joints, Limits, Robot, Segment, Setup, Sha
 use arm_gap::data::session::{ComparisonMode, Session};
 use arm_ident::regression::trial::{Role, Tolerance, Trial};
 use arm_sim::{
-    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start, simulate,
+    Coupling, Drive, Experiment, HandlePath, Movement, SensorChannel, Sensors, Start, simulate,
 };
 
 /// Of every trial \[Hz\].
@@ -79,8 +79,8 @@ pub fn session(effects: &[Effect<f64>], noise: (f64, f64)) -> Session<2> {
             let mut sensors = Sensors::<2>::ideal();
             sensors.rate = RATE;
             sensors.seed = 100 * configuration as u64 + repeat;
-            sensors.angle = [Channel::white(noise.0); 2];
-            sensors.force = [Channel::white(noise.1); 2];
+            sensors.angle = [SensorChannel::white(noise.0); 2];
+            sensors.force = [SensorChannel::white(noise.1); 2];
             let read = sensors.read(&experiment, &recording).expect("readings");
             let count = read.time.len();
             trials.push(Trial {

@@ -188,7 +188,7 @@ struct Slowed<const N: usize> {
 /// A movement at the requested pace or, where that would exceed a limit, as fast as is allowed.
 fn slowed<const N: usize>(
     question: &Question<N>,
-    asked: Task<N>,
+    requested: Task<N>,
     allowed: &Allowed<N>,
 ) -> Result<Slowed<N>, IdentError> {
     let (mut pace, mut least) = (1.0, LEAST_PACE);
@@ -199,9 +199,9 @@ fn slowed<const N: usize>(
     let mut runs = 0;
     loop {
         let task = Task {
-            speed: pace * asked.speed,
-            acceleration: pace * pace * asked.acceleration,
-            ..asked.clone()
+            speed: pace * requested.speed,
+            acceleration: pace * pace * requested.acceleration,
+            ..requested.clone()
         };
         let seen = Seen::of(question, &task)?;
         let found = seen.demand;

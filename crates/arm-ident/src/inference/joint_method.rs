@@ -154,9 +154,9 @@ impl<const N: usize> Task<'_, N> {
     ) -> Result<(Self, Settled<N>, Option<IdentError>), IdentError> {
         let measured = || self.by_measured(model, options.cutoff);
         let certain = |(task, found)| (task, found, None);
-        let asked = options.motion;
-        if asked == MotionSource::Measured
-            || asked == MotionSource::Auto && !self.fit.iter().all(|t| can_simulate(t))
+        let requested = options.motion;
+        if requested == MotionSource::Measured
+            || requested == MotionSource::Auto && !self.fit.iter().all(|t| can_simulate(t))
         {
             return measured().map(certain);
         }
@@ -172,7 +172,7 @@ impl<const N: usize> Task<'_, N> {
             false => (task, found),
         };
         match best.map(concluded) {
-            Err(error) if asked == MotionSource::Auto => {
+            Err(error) if requested == MotionSource::Auto => {
                 measured().map(|(task, found)| (task, found, Some(error)))
             }
             ended => ended.map(certain),

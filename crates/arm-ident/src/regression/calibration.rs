@@ -76,8 +76,12 @@ impl<const N: usize> Prediction<N> {
         let pose = Pose::new(q);
         let seen = trial.motion(i, q, qd);
         self.memory.advance(&seen, 1.0 / trial.rate);
-        let torque = inverse_dynamics(&motion.felt(&model.chain, i), &pose, qd, qdd)
-            + resisting_torque(&model.fitted, &seen, &self.memory.fitted)
+        let torque = inverse_dynamics(
+            &motion.chain_in_moving_frame(&model.chain, i),
+            &pose,
+            qd,
+            qdd,
+        ) + resisting_torque(&model.fitted, &seen, &self.memory.fitted)
             + resisting_torque(&model.held, &seen, &self.memory.held)
             - trial.torque.as_ref().map_or_else(Joints::zeros, |t| t[i])
             - Joints::repeat(trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]));
@@ -151,7 +155,7 @@ fn angle_offset<const N: usize>(
 ) -> Joints<f64, N> {
     /// Half of the step of the central difference \[rad\]: its square is the error of truncation, rounding over it about 1e-11.
     const STEP: f64 = 1e-5;
-    let chain = motion.felt(&model.chain, i);
+    let chain = motion.chain_in_moving_frame(&model.chain, i);
     let row = |shift: f64| {
         let mut q = motion.q[i];
         q[joint] += shift;

@@ -96,7 +96,7 @@ impl<'a, const N: usize> Building<'a, N> {
         let i = rows.samples[k];
         let here = k * N..(k + 1) * N;
         let (qd, qdd) = (&motion.qd[i], &motion.qdd[i]);
-        let chain = motion.felt(&model.chain, i);
+        let chain = motion.chain_in_moving_frame(&model.chain, i);
         let at = Sample::new(&chain, trial, (&motion.q[i], qd, qdd), i);
         self.memory.advance(&at.motion, 1.0 / trial.rate);
         let memory = &self.memory;
@@ -125,9 +125,9 @@ impl<'a, const N: usize> Building<'a, N> {
             if let Source::Segment(s, moment) = unknown.source {
                 explained += column * value_of(&chain, s, moment);
             }
-            let told =
+            let torques =
                 Joints::<f64, N>::from_fn(|j, _| if self.rests(i, j) { 0.0 } else { column[j] });
-            values[here.clone()].copy_from_slice(told.as_slice());
+            values[here.clone()].copy_from_slice(torques.as_slice());
         }
         // What the rigid arm does besides the unknown moments: rotors, held normal moments, held segments.
         for (j, value) in rows.rhs[here].iter_mut().enumerate() {

@@ -4,7 +4,7 @@ use crate::regression::equation::{Building, Sample, effect_value, value_of};
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
 use crate::regression::rows::Rows;
-use crate::regression::sensitivity::{Answers, Course, HELD};
+use crate::regression::sensitivity::{Course, HELD, Responses};
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Imperfection, Source, Unknown};
 use arm_core::effect::resisting_torque;
@@ -24,7 +24,7 @@ pub(crate) struct Instrument<'a, const N: usize> {
     pub(crate) course: &'a Course<N>,
     /// Of the force channels \[s\].
     pub(crate) delay: f64,
-    pub(crate) answers: Option<Answers<'a, N>>,
+    pub(crate) responses: Option<Responses<'a, N>>,
     pub(crate) memory: InternalStates<N>,
 }
 
@@ -43,7 +43,7 @@ impl<'a, const N: usize> Instrument<'a, N> {
             building: Building::new((model, unknowns), trial, motion),
             course,
             delay,
-            answers: (N > HELD).then(|| course.answers(model, unknowns)),
+            responses: (N > HELD).then(|| course.responses(model, unknowns)),
             memory: InternalStates::new(model),
         }
     }
@@ -58,8 +58,8 @@ impl<'a, const N: usize> Instrument<'a, N> {
             motion,
             ..
         } = self.building;
-        if let Some(answers) = &mut self.answers {
-            for (column, more) in rows.columns.iter_mut().zip(answers.next(count)) {
+        if let Some(responses) = &mut self.responses {
+            for (column, more) in rows.columns.iter_mut().zip(responses.next(count)) {
                 for (value, more) in column.iter_mut().zip(more) {
                     *value += more;
                 }

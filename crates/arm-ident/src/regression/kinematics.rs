@@ -21,7 +21,7 @@ pub struct Kinematics<const N: usize> {
 
 impl<const N: usize> Kinematics<N> {
     /// The arm at a sample while its first joint moves: gravity minus the acceleration of that joint acts on it.
-    pub fn felt(&self, chain: &Chain<f64, N>, i: usize) -> Chain<f64, N> {
+    pub fn chain_in_moving_frame(&self, chain: &Chain<f64, N>, i: usize) -> Chain<f64, N> {
         let ([gy, gz], base) = (chain.gravity(), self.base.as_ref());
         base.map_or(*chain, |a| chain.with_gravity([gy - a[i][0], gz - a[i][1]]))
     }

@@ -130,12 +130,16 @@ impl<const N: usize> Course<N> {
     }
 
     /// What the unknowns of the arm change, from the first sample on.
-    pub fn answers<'a>(&'a self, model: &'a Model<N>, unknowns: &'a [Unknown]) -> Answers<'a, N> {
+    pub fn responses<'a>(
+        &'a self,
+        model: &'a Model<N>,
+        unknowns: &'a [Unknown],
+    ) -> Responses<'a, N> {
         let count = unknowns
             .iter()
             .take_while(|u| !matches!(u.source, Source::Calibration(_)))
             .count();
-        Answers {
+        Responses {
             course: self,
             model,
             direct: Building::new((model, &unknowns[..count]), &self.fine, &self.motion),
@@ -147,7 +151,7 @@ impl<const N: usize> Course<N> {
 }
 
 /// What one unit of each unknown of the arm adds to the torques through speeds and accelerations, a stretch after another.
-pub(crate) struct Answers<'a, const N: usize> {
+pub(crate) struct Responses<'a, const N: usize> {
     course: &'a Course<N>,
     model: &'a Model<N>,
     /// What each adds directly.
@@ -159,7 +163,7 @@ pub(crate) struct Answers<'a, const N: usize> {
     done: usize,
 }
 
-impl<const N: usize> Answers<'_, N> {
+impl<const N: usize> Responses<'_, N> {
     /// Columns like those of [`Building`] for the next samples of the trial, none for the calibration.
     pub fn next(&mut self, count: usize) -> Vec<Vec<f64>> {
         let Course { fine, parts, .. } = self.course;

@@ -4,7 +4,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_ident::IdentError;
 use arm_ident::inference::by_simulation::{Fit, Free, Recorded, fit};
 use arm_numerics::NumericsError;
-use arm_sim::{Experiment, Integrator, Recording, models, simulate};
+use arm_sim::{Experiment, Integrator, Recording, sample_experiments, simulate};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
@@ -14,7 +14,8 @@ const ANGLE_NOISE: f64 = 1.7e-3;
 const FORCE_NOISE: f64 = 0.2;
 
 fn experiment(joints: [f64; 6]) -> Experiment<3> {
-    let mut experiment = models::human_experiment(2.0, [0.0; 3]).expect("a sample experiment");
+    let mut experiment =
+        sample_experiments::human_experiment(2.0, [0.0; 3]).expect("a sample experiment");
     experiment.integrator = Integrator::SemiImplicitEuler;
     experiment.output_interval = Some(0.02);
     for (effect, value) in experiment.effects.iter_mut().zip(joints) {

@@ -3,7 +3,7 @@
 use super::joint_method::named;
 use super::noise::Noise;
 use super::synthetic::{EXACT, Recipe, State, at_every_joint, wrong};
-use arm_core::{Joints, models};
+use arm_core::{Joints, sample_arms};
 use arm_ident::cascade::{Options, identify};
 use arm_ident::inference::estimate::{Decision, Identified};
 use arm_ident::regression::trial::Trial;
@@ -53,7 +53,7 @@ fn trial(seed: u64, path: impl Fn(f64) -> State<2>) -> Trial<2> {
         rate: 50.0,
         duration: 8.0 * SWING,
         quasi_static: true,
-        ..Recipe::new(models::mechanical_arm())
+        ..Recipe::new(sample_arms::mechanical_arm())
     };
     let mut trial = recipe.torque_trial(&path, &[]);
     let mut noise = Noise::new(seed);
@@ -74,7 +74,7 @@ fn trial(seed: u64, path: impl Fn(f64) -> State<2>) -> Trial<2> {
 }
 
 fn identified(trial: Trial<2>) -> Identified<2> {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut model = wrong(&truth, [[1.1, 1.0, 1.1], [1.1, 1.0, 1.1]], 0.1);
     model.fitted = at_every_joint::<2>(&["coulomb"]);
     identify(&model, &[trial], &OPTIONS).expect("identification succeeds")
@@ -141,7 +141,7 @@ fn swinging(seed: u64, speed: f64, acceleration: f64) -> Trial<2> {
     let recipe = Recipe {
         rate: 50.0,
         duration: 16.0 * speed / acceleration * core::f64::consts::TAU,
-        ..Recipe::new(models::mechanical_arm())
+        ..Recipe::new(sample_arms::mechanical_arm())
     };
     let mut trial = recipe.torque_trial(&path, &[]);
     let mut noise = Noise::new(seed);
@@ -156,7 +156,7 @@ fn swinging(seed: u64, speed: f64, acceleration: f64) -> Trial<2> {
 /// Intervals that took inertia for nothing missed the truth by ten of their widths and said "by data".
 #[test]
 fn inertia_widens_the_intervals_of_a_movement_that_is_not_quasi_static() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut model = wrong(&truth, [[1.1, 1.0, 1.1], [1.1, 1.0, 1.1]], 0.3);
     model.fitted = at_every_joint::<2>(&["coulomb", "constant_moment"]);
     let run = |speed, acceleration| {

@@ -1,7 +1,7 @@
 //! Forecasts and plans: what follows from more trials, less noise and wider limits, and what no plan may do.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Contact, Elbow, Joints, Robot, Shape, models};
+use arm_core::{Contact, Elbow, Joints, Robot, Shape, sample_arms};
 use arm_ident::IdentError;
 use arm_ident::experiment_design::design::{Allowed, design};
 use arm_ident::experiment_design::forecast::{Accuracy, Question, Task, forecast};
@@ -11,7 +11,7 @@ use arm_ident::regression::trial::{Model, Tolerance};
 fn question(tolerance: Tolerance) -> Question<2> {
     Question {
         model: Model {
-            chain: models::mechanical_arm(),
+            chain: sample_arms::mechanical_arm(),
             segment_uncertainty: 0.1,
             fitted: vec![
                 Effect::new(Kind::Coulomb, 0).with(&[0.139]),

@@ -3,7 +3,7 @@
 use super::joint_method::{close, exactly, named, rms};
 use super::noise::{Noise, most};
 use super::synthetic::{EXACT, Recipe, State, sines, wrong};
-use arm_core::models;
+use arm_core::sample_arms;
 use arm_ident::inference::joint_method::{Options, identify};
 use arm_ident::regression::trial::{Tolerance, Trial};
 
@@ -146,7 +146,7 @@ fn displaced(
 
 #[test]
 fn each_imperfection_of_the_measurement_is_absorbed_with_its_sign_and_size() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let path = sines([-0.6, 1.2], 0.3, 1.0);
     let mut recipe = Recipe::new(truth);
     recipe.rate = 250.0;
@@ -195,7 +195,7 @@ fn each_imperfection_of_the_measurement_is_absorbed_with_its_sign_and_size() {
 fn calibration_within_tolerance_does_not_shrink_the_arm() {
     // Noise of the force stands in the gain's column too: a fit that allows for that regresses noise on itself and
     // finds a gain of several tolerances and an arm that is too light by as much.
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut recipe = Recipe::new(truth);
     recipe.rate = 50.0;
     recipe.duration = 60.0;

@@ -3,7 +3,7 @@
 use super::joint_method::{close, exactly, human, named, rms, two_factors};
 use super::noise::Noise;
 use super::synthetic::{Recipe, State, at_every_joint, effect, sines, wrong};
-use arm_core::{Chain, Joints, models};
+use arm_core::{Chain, Joints, sample_arms};
 use arm_ident::inference::estimate::Decision;
 use arm_ident::inference::joint_method::{Options, identify};
 use arm_ident::regression::trial::Trial;
@@ -117,7 +117,7 @@ fn the_rest_angle_of_a_spring_is_an_unknown() {
 
 #[test]
 fn forces_at_the_tip_tell_as_much_as_torques() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let path = sines([-0.6, 1.2], 0.3, 1.0);
     let effects = [effect("viscous", 0, &[0.25]), effect("viscous", 1, &[0.1])];
     let trial = Recipe::new(truth).force_trial(&path, &effects);
@@ -200,7 +200,7 @@ fn every_estimate_is_an_arm_that_can_exist() {
 
 #[test]
 fn friction_that_is_not_there_is_not_found_and_never_negative() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut model = wrong(&truth, two_factors(), 0.3);
     model.fitted = at_every_joint::<2>(&["coulomb", "viscous"]);
     let (mut bounds, mut covered, mut all) = (0, 0, 0);
@@ -286,7 +286,7 @@ fn a_static_movement_tells_first_moments_and_no_mass() {
 #[test]
 fn without_load_ratios_are_found_and_the_scale_is_the_models() {
     // The swing of a double pendulum with friction, integrated here: only the motion is seen.
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let trial = swing(&truth, [0.08, 0.03]);
     let mut model = wrong(&truth, [[1.1, 0.96, 0.9], [1.05, 1.02, 1.1]], 0.1);
     model.fitted = at_every_joint::<2>(&["viscous"]);

@@ -3,14 +3,14 @@
 use super::joint_method::{close, exactly, two_factors};
 use super::noise::Noise;
 use super::synthetic::{Recipe, at_every_joint, effect, sines, wrong};
-use arm_core::models;
+use arm_core::sample_arms;
 use arm_ident::IdentError;
 use arm_ident::inference::joint_method::{MotionSource, Options, identify};
 use arm_ident::regression::trial::{Model, Role, Tolerance, Trial};
 
 #[test]
 fn what_stands_in_a_gap_has_no_influence() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut recipe = Recipe::new(truth);
     recipe.rate = 200.0;
     let mut trial = recipe.torque_trial(&sines([-0.6, 1.2], 0.3, 1.0), &[]);
@@ -44,7 +44,7 @@ fn what_stands_in_a_gap_has_no_influence() {
 
 #[test]
 fn test_trials_change_no_bit_of_the_estimate() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut recipe = Recipe::new(truth);
     recipe.rate = 200.0;
     recipe.force = Some(|t| [1.0 + libm::sin(t), 2.0 * libm::cos(0.7 * t)]);
@@ -88,7 +88,7 @@ fn test_trials_change_no_bit_of_the_estimate() {
 
 #[test]
 fn the_same_input_gives_the_same_bits() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut recipe = Recipe::new(truth);
     recipe.rate = 200.0;
     let trial = recipe.force_trial(
@@ -107,7 +107,7 @@ fn the_same_input_gives_the_same_bits() {
 #[test]
 fn the_start_does_not_matter() {
     // Rounds of linearising converge: started from the estimate itself, with the same prior's width, nothing moves.
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut recipe = Recipe::new(truth);
     recipe.rate = 200.0;
     let path = sines([-0.6, 1.2], 0.3, 1.0);
@@ -141,7 +141,7 @@ fn the_start_does_not_matter() {
 
 #[test]
 fn what_cannot_be_used_is_refused() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let mut recipe = Recipe::new(truth);
     recipe.rate = 200.0;
     let trial = recipe.torque_trial(&sines([-0.6, 1.2], 0.3, 1.0), &[]);

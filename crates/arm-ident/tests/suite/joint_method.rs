@@ -1,6 +1,6 @@
 //! Shared by the tests of the joint method: input, and access to results.
 
-use arm_core::{Chain, Segment, models};
+use arm_core::{Chain, Segment, sample_arms};
 use arm_ident::inference::estimate::{Estimate, Identified};
 use arm_ident::inference::joint_method::{MotionSource, Options};
 
@@ -16,7 +16,7 @@ pub fn exactly() -> Options {
 }
 
 pub fn human() -> Chain<f64, 3> {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let segments: [Segment<f64>; 3] = core::array::from_fn(|k| Segment {
         inertia: [0.0155, 0.0055, 0.0012][k],
         ..arm.segments()[k]

@@ -6,7 +6,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_core::estimator::{Decision, Estimator, Sample, Settings};
 use arm_core::{
     Chain, Contact, Elbow, Equation, Joints, Limits, Measured, Real, Robot, Segment, Setup, Shape,
-    models,
+    sample_arms,
 };
 use arm_ident::inference::estimate::Identified;
 use arm_ident::inference::joint_method::{Options, identify};
@@ -15,7 +15,7 @@ use arm_ident::regression::trial::{Model, Trial};
 use super::noise::Noise;
 
 use arm_sim::{
-    Channel, Coupling, Drive, Experiment, HandlePath, Movement, Sensors, Start, simulate,
+    Coupling, Drive, Experiment, HandlePath, Movement, SensorChannel, Sensors, Start, simulate,
 };
 
 /// Stiffness of the contact \[N/m\].
@@ -82,7 +82,7 @@ fn batch(found: &Identified<2>) -> Vec<(String, f64, f64)> {
 
 /// The mechanical arm of the thesis with its brakes, led by a robot for 12 s and read by sensors at 1 kHz.
 fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let waypoints: Vec<Joints<f64, 2>> = [
         [-60, 50],
         [-20, 50],
@@ -121,16 +121,16 @@ fn virtual_arm(seed: u64) -> (Model<2>, Trial<2>, Option<Vec<Joints<f64, 2>>>) {
     let mut sensors = Sensors::ideal();
     sensors.rate = 1000.0;
     sensors.seed = seed;
-    sensors.angle = [Channel::white(0.1_f64.to_radians()); 2];
-    sensors.force = [Channel {
+    sensors.angle = [SensorChannel::white(0.1_f64.to_radians()); 2];
+    sensors.force = [SensorChannel {
         range: 110.0,
         bits: Some(12),
-        ..Channel::white(0.2)
+        ..SensorChannel::white(0.2)
     }; 2];
-    sensors.robot = [Channel {
+    sensors.robot = [SensorChannel {
         range: core::f64::consts::TAU,
         bits: Some(20),
-        ..Channel::IDEAL
+        ..SensorChannel::IDEAL
     }; 2];
     let read = sensors.read(&experiment, &recording).expect("readings");
     let pairs = |v: &[f64]| -> Vec<[f64; 2]> { v.chunks_exact(2).map(|c| [c[0], c[1]]).collect() };

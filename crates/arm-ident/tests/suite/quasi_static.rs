@@ -2,7 +2,7 @@
 
 use super::noise::Noise;
 use super::synthetic::wrong;
-use arm_core::{Chain, Joints, Plane, Pose, gravity, jacobian, models};
+use arm_core::{Chain, Joints, Plane, Pose, gravity, jacobian, sample_arms};
 use arm_ident::cascade::quasi_static::Stream;
 
 const SAMPLES: usize = 3000;
@@ -23,7 +23,7 @@ fn samples(chain: &Chain<f64, 2>) -> (Vec<Joints<f64, 2>>, Vec<Plane<f64>>) {
 
 #[test]
 fn the_stream_finds_the_first_moments_from_a_wrong_start() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let (q, force) = samples(&truth);
     let model = wrong(&truth, [[1.1, 0.95, 1.0], [0.92, 1.06, 1.0]], 0.1);
     let mut stream = Stream::new(&model.chain);
@@ -39,7 +39,7 @@ fn the_stream_finds_the_first_moments_from_a_wrong_start() {
 
 #[test]
 fn the_stream_is_the_same_however_it_is_cut() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let (q, force) = samples(&truth);
     let model = wrong(&truth, [[1.1, 0.95, 1.0], [0.92, 1.06, 1.0]], 0.1);
     let solve = |cut: usize| {

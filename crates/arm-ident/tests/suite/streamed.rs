@@ -3,7 +3,7 @@
 use super::joint_method::{exactly, two_factors};
 use super::noise::Noise;
 use super::synthetic::{Recipe, at_every_joint, effect, sines, wrong};
-use arm_core::{Joints, models};
+use arm_core::{Joints, sample_arms};
 use arm_ident::IdentError;
 use arm_ident::inference::joint_method::identify;
 use arm_ident::regression::measured_motion::low_pass;
@@ -104,7 +104,7 @@ fn what_is_not_finite_is_named_by_its_sample() {
 /// The samples, speeds and accelerations beside them, what is in work, and little more: the rows would take eleven times a sample.
 #[test]
 fn memory_is_bounded_by_the_samples() {
-    let truth = models::mechanical_arm();
+    let truth = sample_arms::mechanical_arm();
     let acting = [
         effect("coulomb", 0, &[0.1, 0.1]),
         effect("viscous", 1, &[0.1]),

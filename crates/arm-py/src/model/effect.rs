@@ -86,7 +86,7 @@ impl Effect {
     /// Channel of the force sensor it acts on.
     #[getter]
     fn channel(&self) -> Option<&'static str> {
-        self.0.channel().map(arm_model::Channel::name)
+        self.0.channel().map(arm_model::ForceChannel::name)
     }
     /// Values by name, in SI units and in the order of the catalogue; read-only.
     #[getter]

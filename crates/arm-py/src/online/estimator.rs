@@ -8,10 +8,12 @@ use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::carrying::{Carried, Carries, add_carried, along, carried, table};
+use super::compensation::{
+    GravityCompensator, TorqueAndSd, along, compensation_torque, push_torque, table,
+};
 use super::rows::{Table, locked, row_of};
 use super::settings::Given;
-use crate::convert::by_rows;
+use crate::arrays::by_rows;
 use crate::errors::invalid;
 use crate::firmware::{DeviceEquation, EFFECTS, UNKNOWNS, with_equation};
 use crate::rig::Rig;
@@ -29,7 +31,7 @@ pub fn statuses() -> Vec<&'static str> {
 }
 
 /// An estimator of some length.
-trait Learns: Carries {
+trait Learns: GravityCompensator {
     fn used(&self) -> usize;
     fn update(&mut self, sample: Option<Read<'_>>) -> SampleStatus;
     /// Values, standard deviations, and what each rests on.
@@ -45,12 +47,12 @@ struct Read<'a> {
     hand: &'a [f64],
 }
 
-impl<T: Real + Send, const N: usize> Carries for Estimator<T, N, UNKNOWNS, EFFECTS> {
+impl<T: Real + Send, const N: usize> GravityCompensator for Estimator<T, N, UNKNOWNS, EFFECTS> {
     fn joints(&self) -> usize {
         N
     }
     fn carry(&self, time: f64, q: &[f64], qd: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
-        carried(time, q, qd, |motion| Estimator::carry(self, motion))
+        compensation_torque(time, q, qd, |motion| Estimator::carry(self, motion))
     }
 }
 
@@ -167,7 +169,7 @@ impl OnlineEstimator {
         time: PyReadonlyArray1<'py, f64>,
         q: Table<'py>,
         qd: Table<'py>,
-    ) -> PyResult<Carried<'py>> {
+    ) -> PyResult<TorqueAndSd<'py>> {
         let estimator = locked(&self.inner);
         along(
             py,
@@ -179,8 +181,9 @@ impl OnlineEstimator {
     /// Values and standard deviations of the unknowns in use, and what each rests on.
     fn estimates(&self) -> Vec<(f64, f64, &'static str)> {
         let all = locked(&self.inner).estimates();
-        let told = all.into_iter();
-        told.map(|(value, sd, decided)| (value, sd, decided.name()))
+        let estimates = all.into_iter();
+        estimates
+            .map(|(value, sd, decided)| (value, sd, decided.name()))
             .collect()
     }
 
@@ -220,8 +223,8 @@ impl Recorded {
             self.decided.push(decided as u8);
         }
         let n = estimator.joints();
-        let carried = estimator.carry(time, q, &vec![0.0; n]);
-        add_carried(carried, n, [&mut self.torque, &mut self.torque_sd]);
+        let torque = estimator.carry(time, q, &vec![0.0; n]);
+        push_torque(torque, n, [&mut self.torque, &mut self.torque_sd]);
         let (residual, excess, age, restarts) = estimator.health();
         self.residual.extend(residual);
         self.excess.push(excess);
@@ -235,17 +238,17 @@ impl Recorded {
         status: Vec<u8>,
         [joints, used]: [usize; 2],
     ) -> PyResult<Bound<'_, PyDict>> {
-        let told = PyDict::new(py);
-        told.set_item("status", status.into_pyarray(py))?;
-        told.set_item("value", table(py, self.value, used)?)?;
-        told.set_item("sd", table(py, self.sd, used)?)?;
-        told.set_item("decided", table(py, self.decided, used)?)?;
-        told.set_item("torque", table(py, self.torque, joints)?)?;
-        told.set_item("torque_sd", table(py, self.torque_sd, joints)?)?;
-        told.set_item("residual", table(py, self.residual, joints)?)?;
-        told.set_item("excess", self.excess.into_pyarray(py))?;
-        told.set_item("age", self.age.into_pyarray(py))?;
-        told.set_item("restarts", self.restarts.into_pyarray(py))?;
-        Ok(told)
+        let columns = PyDict::new(py);
+        columns.set_item("status", status.into_pyarray(py))?;
+        columns.set_item("value", table(py, self.value, used)?)?;
+        columns.set_item("sd", table(py, self.sd, used)?)?;
+        columns.set_item("decided", table(py, self.decided, used)?)?;
+        columns.set_item("torque", table(py, self.torque, joints)?)?;
+        columns.set_item("torque_sd", table(py, self.torque_sd, joints)?)?;
+        columns.set_item("residual", table(py, self.residual, joints)?)?;
+        columns.set_item("excess", self.excess.into_pyarray(py))?;
+        columns.set_item("age", self.age.into_pyarray(py))?;
+        columns.set_item("restarts", self.restarts.into_pyarray(py))?;
+        Ok(columns)
     }
 }

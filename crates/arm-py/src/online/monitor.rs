@@ -2,12 +2,12 @@
 
 use std::sync::Mutex;
 
-use arm_core::monitor::{Channel, Monitor, Observation, Quantity, Times};
+use arm_core::monitor::{Monitor, MonitoredChannel, Observation, Quantity, Times};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use super::rows::{Table, locked};
-use crate::convert::by_rows;
+use crate::arrays::by_rows;
 use crate::errors::{bad_input, invalid};
 
 /// Channels that the C interface watches.
@@ -26,7 +26,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    fn core(&self) -> PyResult<Channel<f64>> {
+    fn core(&self) -> PyResult<MonitoredChannel<f64>> {
         use Quantity::{Acceleration, Angle, Force, Power, Speed};
         let all = [Angle, Speed, Acceleration, Force, Power];
         let Some(quantity) = all.into_iter().find(|q| q.name() == self.quantity) else {
@@ -34,7 +34,7 @@ impl Limits {
             return Err(bad_input("quantity", &self.quantity, &allowed));
         };
         let any = |change: f64| if change == 0.0 { f64::INFINITY } else { change };
-        let mut channel = Channel::range(quantity, self.min, self.max)
+        let mut channel = MonitoredChannel::range(quantity, self.min, self.max)
             .fastest(any(self.fastest))
             .farthest(any(self.farthest));
         channel.frozen_after = (self.frozen_after > 0).then_some(self.frozen_after);
@@ -60,7 +60,7 @@ impl OnlineMonitor {
         if count == 0 || count > CHANNELS {
             return Err(bad_input("channels", format!("{count} of them"), "1 to 16"));
         }
-        let mut kept = [Channel::magnitude(Quantity::Force, f64::INFINITY); CHANNELS];
+        let mut kept = [MonitoredChannel::magnitude(Quantity::Force, f64::INFINITY); CHANNELS];
         for (place, limits) in kept.iter_mut().zip(&channels) {
             *place = limits.core()?;
         }

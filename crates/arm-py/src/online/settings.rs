@@ -94,7 +94,7 @@ fn settings_dict<'py, T: Real, const N: usize>(
     period: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let s = Settings::new(equation.chain(), T::of(period));
-    let told = PyDict::new(py);
+    let values = PyDict::new(py);
     for (name, value) in [
         ("period", s.period),
         ("cutoff", s.cutoff),
@@ -108,11 +108,11 @@ fn settings_dict<'py, T: Real, const N: usize>(
         ("frozen_after", s.frozen_after),
         ("forgetting", s.forgetting),
     ] {
-        told.set_item(name, value.to_f64())?;
+        values.set_item(name, value.to_f64())?;
     }
-    told.set_item("noise", s.noise.map(T::to_f64).to_vec())?;
+    values.set_item("noise", s.noise.map(T::to_f64).to_vec())?;
     let range = s.range.map(|ends| ends.map(T::to_f64));
-    told.set_item("range", range.to_vec())?;
-    told.set_item("envelope", s.envelope.map(T::to_f64).to_vec())?;
-    Ok(told)
+    values.set_item("range", range.to_vec())?;
+    values.set_item("envelope", s.envelope.map(T::to_f64).to_vec())?;
+    Ok(values)
 }

@@ -224,6 +224,8 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<GapResult>()?;
     m.add_class::<Screening>()?;
     m.add("MISFIT", core::MISFIT)?;
+    m.add("TIE", core::TIE)?;
+    m.add("THRESHOLD", arm_gap::candidates::candidate::THRESHOLD)?;
     m.add_function(wrap_pyfunction!(verdict_of, m)?)?;
     m.add_function(wrap_pyfunction!(channel_names, m)?)?;
     m.add_function(wrap_pyfunction!(sizes, m)?)?;

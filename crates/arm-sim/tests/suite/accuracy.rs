@@ -1,7 +1,7 @@
 //! The documented order of the integrators, and the error of the reference workload.
 
 use arm_core::effect::{Effect, Kind};
-use arm_sim::{Experiment, Integrator, models, simulate_batch};
+use arm_sim::{Experiment, Integrator, sample_experiments, simulate_batch};
 
 use crate::common::{largest, run, several_effects, smooth};
 
@@ -80,7 +80,8 @@ fn rk4_is_of_fourth_order_with_memory_base_motion_and_friction() {
 /// performance.md: 1.0e-6 rad and 4e-10 rad over 20 s.
 #[test]
 fn the_reference_workload_is_as_accurate_as_measured_elsewhere() {
-    let experiment = models::human_experiment(20.0, [0.0; 3]).expect("a sample experiment");
+    let experiment =
+        sample_experiments::human_experiment(20.0, [0.0; 3]).expect("a sample experiment");
     let euler = error(experiment.clone(), Integrator::SemiImplicitEuler, 0.25e-3);
     assert!(euler < 2e-6, "semi-implicit Euler {euler}");
     let rk4 = error(experiment, Integrator::Rk4, 1e-3);

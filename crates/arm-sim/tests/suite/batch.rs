@@ -1,7 +1,7 @@
 //! Lanes and threads have the bits of single runs.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Limits, Shape, models};
+use arm_core::{Limits, Shape, sample_arms};
 use arm_sim::{
     Coupling, Drive, Experiment, HandlePath, Integrator, Interpolation, Movement, Series,
     SimulationError, Start, digest, simulate, simulate_batch,
@@ -95,7 +95,7 @@ fn lanes_have_the_bits_of_single_runs_with_a_rigid_coupling() {
 /// Ramps that end inside of steps, in each lane of another one, and torques that jump.
 #[test]
 fn lanes_have_the_bits_of_single_runs_where_drives_break() {
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     let [from, to] = [[-68f64, 40.0, 0.0], [-66.0, 43.0, 1.0]].map(|q| q.map(f64::to_radians));
     for coupling in [Coupling::Compliant, Coupling::Rigid] {
         let mut base = smooth(0.25);

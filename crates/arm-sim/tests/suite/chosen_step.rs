@@ -4,8 +4,8 @@ use core::ops::ControlFlow;
 
 use arm_core::effect::{Effect, Kind};
 use arm_sim::{
-    Columns, Experiment, Integrator, Resolved, Sensors, SimulationError, digest, models, resolve,
-    simulate, simulate_accurately, simulate_batch,
+    Columns, Experiment, Integrator, Resolved, Sensors, SimulationError, digest, resolve,
+    sample_experiments, simulate, simulate_accurately, simulate_batch,
 };
 
 use crate::common::{largest, run, several_effects, smooth};
@@ -44,7 +44,7 @@ fn errors<const N: usize>(experiment: &Experiment<N>, accuracy: f64, finer: f64)
 fn angles_are_right_to_what_was_asked_for_and_the_estimate_is_close() {
     for (experiment, name) in [
         (
-            sampled(models::human_experiment(4.0, [0.0; 3]).expect("valid")),
+            sampled(sample_experiments::human_experiment(4.0, [0.0; 3]).expect("valid")),
             "human",
         ),
         (sampled(smooth(2.0)), "smooth"),
@@ -67,7 +67,7 @@ fn where_something_is_not_smooth_the_accuracy_is_kept_too() {
         println!("several {accuracy:e}: estimated {estimated:e}, found {found:e}, step {dt:e}");
         assert!(estimated <= accuracy && found <= accuracy);
     }
-    let mut dry = sampled(models::human_experiment(2.0, [0.0; 3]).expect("valid"));
+    let mut dry = sampled(sample_experiments::human_experiment(2.0, [0.0; 3]).expect("valid"));
     for joint in 0..3 {
         dry.effects
             .push(Effect::new(Kind::Coulomb, joint).with(&[0.3, 0.0]));
@@ -81,7 +81,7 @@ fn where_something_is_not_smooth_the_accuracy_is_kept_too() {
 
 #[test]
 fn it_is_the_run_of_the_step_that_it_tells() {
-    let experiment = sampled(models::human_experiment(2.0, [0.0; 3]).expect("valid"));
+    let experiment = sampled(sample_experiments::human_experiment(2.0, [0.0; 3]).expect("valid"));
     let one = core::slice::from_ref(&experiment);
     let (recording, resolved) = simulate_accurately(one, 1e-6, 1).remove(0).expect("runs");
     let mut again = experiment.clone();
@@ -94,7 +94,8 @@ fn it_is_the_run_of_the_step_that_it_tells() {
 fn a_run_has_the_same_bits_alone_and_beside_others() {
     let runs: Vec<_> = (0..11)
         .map(|i| {
-            let mut run = sampled(models::human_experiment(1.0, [0.0; 3]).expect("valid"));
+            let mut run =
+                sampled(sample_experiments::human_experiment(1.0, [0.0; 3]).expect("valid"));
             // From soft to so stiff that another step is found.
             run.setup.contact.stiffness = [1e3 * f64::from(1 + i * i); 2];
             run
@@ -116,12 +117,15 @@ fn a_run_has_the_same_bits_alone_and_beside_others() {
 
 #[test]
 fn what_cannot_be_reached_is_refused() {
-    let experiment = sampled(models::human_experiment(0.1, [0.0; 3]).expect("valid"));
+    let experiment = sampled(sample_experiments::human_experiment(0.1, [0.0; 3]).expect("valid"));
     let refused = step_of(&experiment, 1e-18).expect_err("beyond rounding");
-    let SimulationError::Accuracy { asked, reached, .. } = refused else {
+    let SimulationError::Accuracy {
+        requested, reached, ..
+    } = refused
+    else {
         panic!("{refused}");
     };
-    assert!(asked < reached && reached < 1e-9, "{refused}");
+    assert!(requested < reached && reached < 1e-9, "{refused}");
     for accuracy in [0.0, -1.0, f64::NAN] {
         assert!(matches!(
             step_of(&experiment, accuracy),
@@ -144,18 +148,19 @@ fn what_cannot_be_reached_is_refused() {
 
 #[test]
 fn a_search_can_be_broken_off() {
-    let experiment = sampled(models::human_experiment(2.0, [0.0; 3]).expect("valid"));
-    let mut asked = 0;
+    let experiment = sampled(sample_experiments::human_experiment(2.0, [0.0; 3]).expect("valid"));
+    let mut calls = 0;
     let found = resolve(&experiment, 1e-6, &mut || {
-        asked += 1;
+        calls += 1;
         ControlFlow::Break(())
     });
-    assert_eq!((found, asked), (Ok(None), 1));
+    assert_eq!((found, calls), (Ok(None), 1));
 }
 
 #[test]
 fn a_contact_too_stiff_for_the_shortest_step_is_called_that() {
-    let mut experiment = sampled(models::human_experiment(0.1, [0.0; 3]).expect("valid"));
+    let mut experiment =
+        sampled(sample_experiments::human_experiment(0.1, [0.0; 3]).expect("valid"));
     experiment.setup.contact.stiffness = [1e15; 2];
     let refused = step_of(&experiment, 1e-6).expect_err("too stiff");
     assert!(
@@ -166,7 +171,8 @@ fn a_contact_too_stiff_for_the_shortest_step_is_called_that() {
 
 #[test]
 fn motion_alone_has_the_bits_of_all_columns() {
-    let mut experiment = sampled(models::human_experiment(1.0, [0.0; 3]).expect("valid"));
+    let mut experiment =
+        sampled(sample_experiments::human_experiment(1.0, [0.0; 3]).expect("valid"));
     let all = run(&experiment);
     experiment.columns = Columns::Motion;
     let alone = run(&experiment);

@@ -1,14 +1,14 @@
 //! Experiments and comparisons that several tests use.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Chain, Contact, Joints, Segment, Setup, Shape, models};
+use arm_core::{Chain, Contact, Joints, Segment, Setup, Shape, sample_arms};
 use arm_sim::{Drive, Experiment, Recording, Start, simulate};
 
 /// The human arm led by a handle whose path is smooth enough for a fourth-order method.
 pub fn smooth(duration: f64) -> Experiment<3> {
     let (from, to) = ([-68.0, 40.0, 0.0], [-56.0, 80.0, 5.0]);
-    let mut experiment = arm_sim::models::led(
-        models::human_arm(),
+    let mut experiment = arm_sim::sample_experiments::led(
+        sample_arms::human_arm(),
         Shape::Smooth,
         (from, to),
         duration,

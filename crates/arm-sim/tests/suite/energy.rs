@@ -1,8 +1,10 @@
 //! Every joule is accounted for.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Chain, Joints, Limits, Pose, Shape, coriolis_matrix, models as arms};
-use arm_sim::{Coupling, Drive, Experiment, HandlePath, Integrator, Movement, Recording, models};
+use arm_core::{Chain, Joints, Limits, Pose, Shape, coriolis_matrix, sample_arms as arms};
+use arm_sim::{
+    Coupling, Drive, Experiment, HandlePath, Integrator, Movement, Recording, sample_experiments,
+};
 
 use crate::common::{most, run, several_effects, smooth};
 
@@ -34,7 +36,7 @@ fn rk4_accounts_for_energy_with_memory_friction_and_a_moving_base() {
 
 #[test]
 fn rk4_accounts_for_energy_on_a_path_with_jumps_of_acceleration() {
-    let recording = run(&models::human_experiment(4.0, [0.0; 3]).expect("a sample"));
+    let recording = run(&sample_experiments::human_experiment(4.0, [0.0; 3]).expect("a sample"));
     let (error, exchanged) = unexplained(&recording);
     println!("trapezoid: {error:e} of {exchanged} J");
     assert!(error < 1e-9 * 4.0 * exchanged, "{error:e} of {exchanged} J");
@@ -51,7 +53,8 @@ fn by_limits<const N: usize>(
     (shape, coupling): (Shape, Coupling),
 ) -> Experiment<N> {
     let mut experiment =
-        models::led(arm, shape, (degrees[0], degrees[1]), 1.0, [0.3; N]).expect("a sample");
+        sample_experiments::led(arm, shape, (degrees[0], degrees[1]), 1.0, [0.3; N])
+            .expect("a sample");
     let [from, to] = degrees.map(|q| q.map(f64::to_radians).into());
     let limits = Limits {
         speed: 0.5,

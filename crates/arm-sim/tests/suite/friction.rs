@@ -4,7 +4,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Segment, Setup, Shape};
 use arm_sim::{
     Drive, Experiment, Integrator, Interpolation, Recording, Series, SimulationError, Start,
-    models, simulate,
+    sample_experiments, simulate,
 };
 
 use crate::common::{largest, most, run};
@@ -88,7 +88,7 @@ fn a_joint_sticks_until_it_is_pulled_harder_than_friction_holds() {
 /// The wrist of an arm that the robot holds at its hand is free: friction alone carries it, at the angle that is given.
 #[test]
 fn a_sticking_wrist_starts_and_stays_where_it_is() {
-    let mut experiment = models::human_experiment(2.0, [0.0; 3]).expect("a sample");
+    let mut experiment = sample_experiments::human_experiment(2.0, [0.0; 3]).expect("a sample");
     experiment.effects = vec![Effect::new(Kind::Coulomb, 2).with(&[2.0, 0.0])];
     let Start::Equilibrium { near } = experiment.start else {
         unreachable!("an equilibrium")
@@ -109,7 +109,8 @@ fn a_sticking_wrist_starts_and_stays_where_it_is() {
 /// Friction that increases the force on which it depends may have no unique solution, and is refused with its loop gain.
 #[test]
 fn friction_that_jams_is_refused() {
-    let mut experiment = models::mechanical_experiment(1.0, [0.0; 2]).expect("a sample");
+    let mut experiment =
+        sample_experiments::mechanical_experiment(1.0, [0.0; 2]).expect("a sample");
     for joint in 0..2 {
         let friction = Effect::new(Kind::LoadFriction, joint).with(&[1.0, 0.0]);
         experiment.effects.push(friction);
@@ -127,7 +128,7 @@ fn friction_that_jams_is_refused() {
 /// An arm of masses, springs and contact 2⁻⁴⁰ times as large moves in the same way, from the start on, to the last bit.
 #[test]
 fn an_arm_that_weighs_next_to_nothing_starts_where_it_must() {
-    let heavy = models::human_experiment(0.5, [-1.1, 0.9, 0.05]).expect("a sample");
+    let heavy = sample_experiments::human_experiment(0.5, [-1.1, 0.9, 0.05]).expect("a sample");
     let mut light = heavy.clone();
     let scale = libm::exp2(-40.0);
     for segment in &mut light.setup.segments {
@@ -198,7 +199,7 @@ pub fn random<const N: usize>(seed: u64) -> (Experiment<N>, Reference<N>) {
             core::array::from_fn(|i| [-60.0, 60.0, 5.0][i.min(2)] + dice.between(-15.0, 15.0));
         let to: [f64; N] = core::array::from_fn(|i| from[i] + dice.between(-25.0, 25.0));
         let duration = dice.between(0.8, 1.6);
-        models::led(
+        sample_experiments::led(
             chain,
             Shape::Trapezoid,
             (from, to),
@@ -302,7 +303,8 @@ fn what_sticking_costs() {
         (Kind::Thixotropy, vec![0.5, 0.0, 0.0, 0.1, 3.0]),
     ] {
         let [smooth, solved] = [0.01, 0.0].map(|smoothing| {
-            let mut experiment = models::mechanical_experiment(2.0, [0.0; 2]).expect("a sample");
+            let mut experiment =
+                sample_experiments::mechanical_experiment(2.0, [0.0; 2]).expect("a sample");
             let values = [&values[..], &[smoothing]].concat();
             experiment.effects = (0..2)
                 .map(|joint| Effect::new(kind, joint).with(&values))

@@ -1,15 +1,15 @@
 //! One run, to the last bit.
 
-use arm_sim::{digest, models};
+use arm_sim::{digest, sample_experiments};
 
 use crate::common::run;
 
-/// Digest of [`models::reference`]; the same on every platform, in debug and release, whatever the target's features.
+/// Digest of [`sample_experiments::reference`]; the same on every platform, in debug and release, whatever the target's features.
 const GOLDEN: u64 = 0xe8cf6740fbb033a9;
 
 #[test]
 fn the_reference_run_has_the_same_bits_everywhere() {
-    let found = digest(&run(&models::reference().expect("a sample"))).expect("numbers");
+    let found = digest(&run(&sample_experiments::reference().expect("a sample"))).expect("numbers");
     assert_eq!(
         found, GOLDEN,
         "\nthe reference run has digest {found:#018x}, expected {GOLDEN:#018x}.\n\

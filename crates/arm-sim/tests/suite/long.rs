@@ -1,7 +1,7 @@
 //! The experiments of tables 4.9 and 4.10 for a minute, and the sign that the thesis prints.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Invalid, Shape, models};
+use arm_core::{Invalid, Shape, sample_arms};
 use arm_sim::{Drive, Experiment, HandlePath, Movement, SimulationError, simulate};
 
 use crate::common::{largest, run};
@@ -51,14 +51,15 @@ fn does_not_drift<const N: usize>(experiment: &Experiment<N>) {
 #[test]
 fn the_mechanical_arm_runs_for_a_minute() {
     let rest = [(-50.0f64).to_radians(), 65f64.to_radians()];
-    let experiment = arm_sim::models::mechanical_experiment(4.0, rest).expect("a sample");
+    let experiment =
+        arm_sim::sample_experiments::mechanical_experiment(4.0, rest).expect("a sample");
     does_not_drift(&minute(experiment, [[-60.0, 50.0], [-40.0, 80.0]]));
 }
 
 #[test]
 fn the_human_arm_runs_for_a_minute() {
     let rest = [-62.0f64, 60.0, 5.0].map(f64::to_radians);
-    let experiment = arm_sim::models::human_experiment(4.0, rest).expect("a sample");
+    let experiment = arm_sim::sample_experiments::human_experiment(4.0, rest).expect("a sample");
     does_not_drift(&minute(
         experiment,
         [[-68.0, 40.0, 0.0], [-56.0, 80.0, 5.0]],
@@ -68,7 +69,8 @@ fn the_human_arm_runs_for_a_minute() {
 /// Errata 16: K_v = −0.2 is negative damping. As a viscosity it is refused.
 #[test]
 fn the_printed_sign_of_viscosity_is_refused() {
-    let mut experiment = arm_sim::models::human_experiment(4.0, [0.0; 3]).expect("a sample");
+    let mut experiment =
+        arm_sim::sample_experiments::human_experiment(4.0, [0.0; 3]).expect("a sample");
     experiment.effects[0] = Effect::new(Kind::Viscous, 0).with(&[-0.2]);
     let refused = simulate(&experiment).expect_err("negative damping");
     assert!(
@@ -82,8 +84,8 @@ fn the_printed_sign_of_viscosity_is_refused() {
 #[test]
 fn a_destabilising_spring_leaves_the_path() {
     let poses = ([-40.0, 50.0, 5.0], [-40.0, 50.0, 5.0]);
-    let mut experiment = arm_sim::models::led(
-        models::human_arm(),
+    let mut experiment = arm_sim::sample_experiments::led(
+        sample_arms::human_arm(),
         Shape::Smooth,
         poses,
         4.0,

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use arm_core::{Elbow, Robot};
 use arm_sim::{
-    Engine, Experiment, Integrator, Piece, Recording, SimulationError, definite, digest, models,
-    simulate_in_pieces, simulate_with,
+    Engine, Experiment, Integrator, Piece, Recording, SimulationError, definite, digest,
+    sample_experiments, simulate_in_pieces, simulate_with,
 };
 
 /// Everything recorded, piece by piece, put together again.
@@ -65,7 +65,7 @@ fn together<const N: usize>(
 
 #[test]
 fn pieces_have_the_bits_of_the_whole() {
-    let mut experiment = models::reference().expect("a sample experiment");
+    let mut experiment = sample_experiments::reference().expect("a sample experiment");
     experiment.duration = 0.5;
     for integrator in [Integrator::Rk4, Integrator::SemiImplicitEuler] {
         experiment.integrator = integrator;
@@ -85,14 +85,16 @@ fn pieces_have_the_bits_of_the_whole() {
 #[cfg(feature = "rapier")]
 #[test]
 fn pieces_of_the_second_engine_too() {
-    let experiment = models::mechanical_experiment(1.0, [0.0; 2]).expect("a sample experiment");
+    let experiment =
+        sample_experiments::mechanical_experiment(1.0, [0.0; 2]).expect("a sample experiment");
     let whole = simulate_with(Engine::Rapier, &experiment).expect("the experiment runs");
     assert_eq!(together(Engine::Rapier, &experiment, 300), whole);
 }
 
 #[test]
 fn a_run_is_broken_off_where_nobody_wants_more() {
-    let experiment = models::mechanical_experiment(1.0, [0.0; 2]).expect("a sample experiment");
+    let experiment =
+        sample_experiments::mechanical_experiment(1.0, [0.0; 2]).expect("a sample experiment");
     let mut seen = 0;
     let done = simulate_in_pieces(Engine::Native, &experiment, 10, &mut |piece| {
         seen += piece.recording.len();
@@ -107,7 +109,7 @@ fn a_run_is_broken_off_where_nobody_wants_more() {
 
 #[test]
 fn what_the_robot_does_not_reach_is_refused_before_the_first_piece() {
-    let mut experiment = models::reference().expect("a sample experiment");
+    let mut experiment = sample_experiments::reference().expect("a sample experiment");
     experiment.effects.clear();
     experiment.robot = Some(Robot::new([0.2, 0.2], [1.05, -0.1], Elbow::Up).expect("a robot"));
     let refused = simulate_in_pieces(Engine::Native, &experiment, 10, &mut |_| panic!("a piece"));
@@ -119,7 +121,8 @@ fn what_the_robot_does_not_reach_is_refused_before_the_first_piece() {
 
 #[test]
 fn what_is_not_a_number_is_named_by_its_place_in_the_run() {
-    let mut experiment = models::mechanical_experiment(1.0, [0.0; 2]).expect("a sample experiment");
+    let mut experiment =
+        sample_experiments::mechanical_experiment(1.0, [0.0; 2]).expect("a sample experiment");
     experiment.output_interval = None;
     let mut refused = None;
     simulate_in_pieces(Engine::Native, &experiment, 50, &mut |piece| {
@@ -146,7 +149,7 @@ fn what_is_not_a_number_is_named_by_its_place_in_the_run() {
 #[test]
 fn memory_does_not_grow_with_the_run() {
     let most = |duration: f64| {
-        let mut experiment = models::reference().expect("a sample experiment");
+        let mut experiment = sample_experiments::reference().expect("a sample experiment");
         experiment.duration = duration;
         experiment.output_interval = None;
         let used = allocation_counter::measure(|| {

@@ -1,12 +1,12 @@
 //! The second engine against the native one: the same experiments from bodies and joints.
 //!
-//! Limits are about twice the differences measured, which `src/rapier.rs` lists.
+//! Limits are about twice the differences measured, which `src/engines/rapier/mod.rs` lists.
 
 use arm_core::effect::{Effect, Kind};
 use arm_core::{Chain, Contact, Invalid, Pose, Segment, Setup, Shape, tip};
 use arm_sim::{
     Coupling, Drive, Engine, Experiment, HandlePath, Interpolation, RapierSettings, Recording,
-    Series, SimulationError, Start, digest, models, simulate_rapier, simulate_with,
+    Series, SimulationError, Start, digest, sample_experiments, simulate_rapier, simulate_with,
 };
 
 use crate::common::{largest, most, run, smooth};
@@ -64,9 +64,9 @@ fn free_swing() -> Experiment<3> {
 
 /// The human arm of table 4.10, let go with its hand in a handle that stands still.
 fn falling() -> Experiment<3> {
-    let arm = arm_core::models::human_arm();
+    let arm = arm_core::sample_arms::human_arm();
     let q = [-1.1, 0.8, 0.1].into();
-    let contact = Contact::new([models::STIFFNESS; 2], [25.0; 2]);
+    let contact = Contact::new([sample_experiments::STIFFNESS; 2], [25.0; 2]);
     let path = HandlePath::fixed(tip(&arm, &Pose::new(&q))).expect("a point");
     let coupling = Coupling::Compliant;
     let drive = Drive::Handle { path, coupling };
@@ -105,14 +105,15 @@ fn order<const N: usize>(experiment: &Experiment<N>) -> f64 {
 
 #[test]
 fn table_4_10_is_led_as_by_the_native_engine() {
-    let experiment = models::human_experiment(20.0, REST).expect("a sample experiment");
+    let experiment = sample_experiments::human_experiment(20.0, REST).expect("a sample experiment");
     assert_below(difference(&experiment, 0.25e-3), [2.5e-8, 2.5e-6, 8e-5]);
 }
 
 #[test]
 fn table_4_9_is_led_as_by_the_native_engine() {
     let rest = [REST[0], REST[1]];
-    let experiment = models::mechanical_experiment(20.0, rest).expect("a sample experiment");
+    let experiment =
+        sample_experiments::mechanical_experiment(20.0, rest).expect("a sample experiment");
     assert_below(difference(&experiment, 0.25e-3), [1.2e-8, 2e-6, 2.5e-5]);
 }
 
@@ -248,9 +249,10 @@ fn a_rigid_coupling_agrees_in_angles_and_force() {
         difference(&rigidly(smooth(4.0)), 0.25e-3),
         [7e-8, 2e-6, 6e-3],
     );
-    let arm = arm_core::models::mechanical_arm();
+    let arm = arm_core::sample_arms::mechanical_arm();
     let path = ([-60.0, 50.0], [-40.0, 80.0]);
-    let two = models::led(arm, Shape::Smooth, path, 4.0, [0.0; 2]).expect("a sample experiment");
+    let two = sample_experiments::led(arm, Shape::Smooth, path, 4.0, [0.0; 2])
+        .expect("a sample experiment");
     assert_below(difference(&rigidly(two), 0.25e-3), [3e-8, 1e-6, 4e-3]);
 }
 

@@ -80,7 +80,7 @@ fn a_contact_too_stiff_for_the_step() {
 #[test]
 fn a_rigid_coupling_of_one_joint() {
     let arm = arm_core::Chain::new(
-        [arm_core::models::mechanical_arm().segments()[0]],
+        [arm_core::sample_arms::mechanical_arm().segments()[0]],
         [0.0; 2],
         [0.0, -9.81],
     )

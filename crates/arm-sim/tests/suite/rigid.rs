@@ -1,6 +1,6 @@
 //! A tip that follows the handle exactly.
 
-use arm_core::{Joints, Pose, inverse_dynamics, models, static_torque};
+use arm_core::{Joints, Pose, inverse_dynamics, sample_arms, static_torque};
 use arm_sim::{Coupling, Drive, Experiment, Integrator, Recording, Start};
 
 use crate::common::{largest, run, several_effects, smooth};
@@ -14,8 +14,8 @@ fn rigid<const N: usize>(mut experiment: Experiment<N>) -> Experiment<N> {
 
 fn mechanical(duration: f64) -> Experiment<2> {
     let poses = ([-60.0, 50.0], [-40.0, 80.0]);
-    arm_sim::models::led(
-        models::mechanical_arm(),
+    arm_sim::sample_experiments::led(
+        sample_arms::mechanical_arm(),
         arm_core::Shape::Smooth,
         poses,
         duration,
@@ -60,7 +60,7 @@ fn two_joints_follow_the_desired_movement() {
 #[test]
 fn the_force_is_that_of_inverse_dynamics() {
     let r = run(&rigid(smooth(1.0)));
-    let arm = models::human_arm();
+    let arm = sample_arms::human_arm();
     for i in (0..r.len()).step_by(37) {
         let joints = |column: &[f64]| Joints::<f64, 3>::from_fn(|j, _| column[3 * i + j]);
         let (q, qd, qdd) = (joints(&r.q), joints(&r.qd), joints(&r.qdd));

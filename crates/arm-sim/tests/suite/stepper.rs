@@ -1,10 +1,10 @@
 //! The native engine a piece at a time: the same bits, states to come back to, and the energy that a port hands over.
 
 use arm_core::effect::{Effect, Kind};
-use arm_core::{Joints, Pose, gravity, jacobian, models as arms, tip};
+use arm_core::{Joints, Pose, gravity, jacobian, sample_arms as arms, tip};
 use arm_sim::{
     Coupling, Drive, Experiment, HandlePath, Outside, Port, SimulationError, Start, Stepper,
-    models, simulate,
+    sample_experiments, simulate,
 };
 
 const DT: f64 = 0.25e-3;
@@ -13,7 +13,7 @@ const ENERGY: f64 = 1e-6;
 
 /// The rig with effects of every kind that a run computes differently.
 fn rig() -> Experiment<3> {
-    let mut experiment = models::reference().unwrap();
+    let mut experiment = sample_experiments::reference().unwrap();
     experiment.duration = 0.6;
     experiment.output_interval = None;
     // One with several states.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from ...errors import BadInput, Text
+from ...errors import NO_FILE, BadInput, Text
 from . import matlab, numpy_files, self_describing, text_formats, text_table, workbook
 from .table import NoTable as NoTable
 from .table import RawColumn as RawColumn
@@ -51,7 +51,9 @@ def read_raw(path: Path) -> list[RawTable]:
     for suffixes, read in _READERS.items():
         if path.suffix.lower() in suffixes:
             if not path.is_file():
-                raise BadInput("file", Text("no such file" if not path.exists() else "no regular file"), "a file that exists", file=path)
+                if path.exists():
+                    raise BadInput("file", Text("no regular file"), "a file that exists", file=path)
+                raise BadInput("file", NO_FILE, "a file that exists", file=path, kind="missing_file")
             try:
                 found = read(path)
             except BadInput as error:

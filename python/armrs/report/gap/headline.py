@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..._armrs import TIE
 from ...catalogue import catalogue, title
 from ...formatting import digits, read_in, with_interval, with_unit
 
@@ -30,8 +31,6 @@ MEANINGS = {
     "Mx": "the contact moment",
 }
 """What a channel measures, by its name without the number."""
-TIE = 10.0
-"""Difference of twice the log-likelihood up to which two laws explain the data as well: odds of 150."""
 _CLOSES = 0.9
 """Share of an open gap above its floor that names close at least where they are what the model lacks, as they do on judgement seeds; where
 something outside the catalogue is missing, false names close up to three quarters (docs/gap.md)."""

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from ... import formatting
-from ..._armrs import MISFIT
+from ..._armrs import MISFIT, TIE
 from ...formatting import digits, number, spread, with_interval
 from .. import sentences as common
 from ..tables import Table, smallest_effects
 from . import headline
-from .headline import TIE, effect_name, joined
+from .headline import effect_name, joined
 
 verdict = headline.headline
 """The result in one sentence."""

@@ -1,0 +1,116 @@
+//! Several numbers side by side, one simulation a lane.
+
+use core::array::from_fn;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use crate::numeric::scalar::Scalar;
+use crate::numeric::transcendental::{exp, tanh};
+
+/// `L` numbers that are computed with together; each lane has the bits of the same computation in `f64`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(32))]
+pub struct Lanes<const L: usize>(pub [f64; L]);
+
+impl<const L: usize> Lanes<L> {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self(from_fn(|i| f(self.0[i], other.0[i])))
+    }
+}
+
+macro_rules! elementwise {
+    ($($trait:ident $method:ident $operator:tt)*) => {$(
+        impl<const L: usize> $trait for Lanes<L> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                self.zip(other, |a, b| a $operator b)
+            }
+        }
+    )*};
+}
+elementwise!(Add add + Sub sub - Mul mul * Div div /);
+
+impl<const L: usize> Neg for Lanes<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|a| -a))
+    }
+}
+
+impl<const L: usize> AddAssign for Lanes<L> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<const L: usize> SubAssign for Lanes<L> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<const L: usize> Scalar for Lanes<L> {
+    const ZERO: Self = Self([0.0; L]);
+    const ONE: Self = Self([1.0; L]);
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        Self([value; L])
+    }
+    #[inline(always)]
+    fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
+        Self(from_fn(|i| {
+            if a.0[i] < b.0[i] {
+                then.0[i]
+            } else {
+                otherwise.0[i]
+            }
+        }))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+    #[inline(always)]
+    fn every(self, condition: impl Fn(f64) -> bool) -> bool {
+        self.0.iter().all(|&a| condition(a))
+    }
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        // Without a branch.
+        self.0.iter().fold(true, |all, a| all & a.is_finite())
+    }
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self(self.0.map(f))
+    }
+    #[inline(always)]
+    fn together<const K: usize>(values: [Self; K], f: impl Fn([f64; K]) -> f64) -> Self {
+        Self(from_fn(|i| f(values.map(|v| v.0[i]))))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.map(libm::sqrt)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        // One loop over lanes and not lanes within each operation: the compiler then uses the widest vectors.
+        let [sin, cos] = f64::sines_and_cosines(&self.0);
+        (Self(sin), Self(cos))
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        self.map(exp)
+    }
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        self.map(tanh)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        self.zip(x, libm::atan2)
+    }
+}

@@ -1,0 +1,6 @@
+//! What surrounds the arm: contact at the handle, robot, and what imperfections of a rig alter.
+
+pub(crate) mod contact;
+pub(crate) mod placement;
+pub(crate) mod robot;
+pub(crate) mod setup;

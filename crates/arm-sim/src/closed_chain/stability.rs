@@ -1,0 +1,105 @@
+//! How long a step may be: before the vibration of the contact grows, and to follow steep dry friction.
+
+use arm_core::effect::Effect;
+use arm_core::{Chain, Contact, Joints, Pose, inertia};
+
+use crate::closed_chain::model::{Link, Model};
+use crate::{Integrator, SimulationError};
+
+/// The fastest vibration of an arm on the springs and dampers of its contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vibration {
+    /// Largest eigenfrequency ω of `B⁻¹ Jᵀ S J` \[rad/s\].
+    pub frequency: f64,
+    /// Largest eigenvalue c of `B⁻¹ Jᵀ D J` \[1/s\].
+    pub damping: f64,
+}
+
+impl Vibration {
+    /// Largest step for which the vibration does not grow \[s\].
+    ///
+    /// Both limits hold for the mode `ẍ + c ẋ + ω² x = 0` with the largest c and the largest ω together, which is exact
+    /// where damping and stiffness share their directions, and safe elsewhere:
+    /// semi-implicit Euler `ω²h² + 2ch < 4`; Rk4 `|λ| h < 2.61`, the radius of its region of stability in the left half-plane.
+    pub fn largest_step(&self, integrator: Integrator) -> f64 {
+        let (w, c) = (self.frequency, self.damping);
+        match integrator {
+            Integrator::SemiImplicitEuler => 4.0 / (c + (c * c + 4.0 * w * w).sqrt()),
+            Integrator::Rk4 => {
+                let overdamped = (c * c - 4.0 * w * w).max(0.0).sqrt();
+                RK4_RADIUS / w.max(0.5 * (c + overdamped))
+            }
+        }
+    }
+
+    /// The vibration at a pose.
+    pub(crate) fn at<const N: usize>(
+        contact: &Contact<f64>,
+        model: &Model<f64, N>,
+        q: &Joints<f64, N>,
+    ) -> Self {
+        let terms = model.terms(&Pose::new(q), &Joints::zeros());
+        // B⁻¹ Jᵀ S J has the eigenvalues of the 2×2 matrix J B⁻¹ Jᵀ S.
+        let columns = [[1.0, 0.0], [0.0, 1.0]]
+            .map(|f| terms.tip_rate(&terms.accelerate(&terms.tip_torque(f))));
+        let largest = |s: [f64; 2]| {
+            let (a, d) = (columns[0][0] * s[0], columns[1][1] * s[1]);
+            let bc = columns[0][1] * columns[1][0] * s[0] * s[1];
+            let (mean, half) = (0.5 * (a + d), 0.5 * (a - d));
+            mean + (half * half + bc).max(0.0).sqrt()
+        };
+        Self {
+            frequency: largest(contact.stiffness).sqrt(),
+            damping: largest(contact.damping),
+        }
+    }
+}
+
+/// Radius of the largest half disc in the left half plane in which the fourth-order method is stable: 2.6155, rounded down.
+const RK4_RADIUS: f64 = 2.61;
+
+/// Largest rate of decay that the fourth-order method follows, times the step: where its stability ends on the negative real axis.
+const RK4_DECAY: f64 = 2.785;
+
+/// Longest step with which the fourth-order method follows smooth dry friction at rest, the arm stretched \[s\].
+///
+/// There the slope `size/smoothing` of the friction makes the speed of its joint decay at the rate `(B⁻¹)_jj size/smoothing`. Infinite where
+/// friction is not smooth, and where its size is a share of the force through the joint.
+pub fn longest_step<const N: usize>(chain: &Chain<f64, N>, effect: &Effect<f64>) -> f64 {
+    let Some(smoothing) = effect.kind.smoothed_by() else {
+        return f64::INFINITY;
+    };
+    let p = &effect.parameters;
+    if p[smoothing] <= 0.0 || effect.kind.info().parameters[0].unit != "N m" {
+        return f64::INFINITY;
+    }
+    let agility = inertia(chain, &Pose::new(&Joints::zeros())).try_inverse();
+    agility.map_or(f64::INFINITY, |m| {
+        let rate = m[(effect.index, effect.index)] * p[0] / p[smoothing];
+        RK4_DECAY / rate
+    })
+}
+
+/// Refuses a contact that is too stiff for the step, judged at one pose.
+///
+/// Dry friction of joints is stiffer still near rest, but bounded, so that it cannot grow without limit; it is not judged.
+pub(crate) fn check<const N: usize>(
+    model: &Model<f64, N>,
+    (integrator, dt): (Integrator, f64),
+    q: &Joints<f64, N>,
+) -> Result<(), SimulationError> {
+    let Link::Compliant(contact) = &model.link else {
+        return Ok(());
+    };
+    let vibration = Vibration::at(contact, model, q);
+    let largest = vibration.largest_step(integrator);
+    if dt <= largest {
+        return Ok(());
+    }
+    Err(SimulationError::TooStiff {
+        frequency: vibration.frequency,
+        damping: vibration.damping,
+        largest,
+        dt,
+    })
+}

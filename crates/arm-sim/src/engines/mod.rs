@@ -1,0 +1,9 @@
+//! Engines that run an experiment: the native one (a single run, a batch, step by step) and rapier.
+
+pub(crate) mod accuracy;
+pub(crate) mod batch;
+pub(crate) mod native;
+#[cfg(feature = "rapier")]
+pub(crate) mod rapier;
+pub(crate) mod simulate;
+pub(crate) mod stepper;

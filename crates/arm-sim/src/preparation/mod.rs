@@ -1,0 +1,5 @@
+//! From an experiment to a run that can start: checks, effects applied, and the initial state.
+
+mod equilibrium;
+pub(crate) mod initial_state;
+pub(crate) mod prepared_run;
