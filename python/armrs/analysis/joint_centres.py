@@ -50,12 +50,24 @@ class JointCentres:
         What each error does to the lengths, which are means over the session.
     found : bool
         Whether the path of a handle was used.
+    contradicted : bool
+        Whether it was not, since it contradicts the markers by more than misplaced markers can.
     """
 
     shift: np.ndarray
     factor: np.ndarray
     elongation: np.ndarray
     found: bool
+    contradicted: bool = False
+
+    def lines(self, model: Model) -> tuple[str, ...]:
+        """Return where the joints were found, for the segments of the data set; nothing where no robot shows them."""
+        if self.contradicted:
+            return ("Angles of arm and robot differ by more than misplaced markers explain: joint centres are those of the markers.",)
+        if not self.found:
+            return ()
+        lengths = [f"{s.length - e:.4f} m ({-1e3 * e:+.1f} mm)" for s, e in zip(model.segments, self.elongation @ self.shift, strict=True)]
+        return (f"Joint centres are those about which the robot's handle turned: lengths {', '.join(lengths)}.",)
 
     def applied(self, dataset: Dataset) -> Dataset:
         """Return a data set with corrected lengths and angles."""
@@ -99,7 +111,7 @@ def find(dataset: Dataset) -> JointCentres:
         return prior
     shift, covariance = _fitted(dataset, seen, prior.elongation, sizes)
     if np.abs(shift / np.where(sizes > 0.0, sizes, np.inf)).max() > _FURTHEST:
-        return prior
+        return dataclasses.replace(prior, contradicted=True)
     spread, axes = np.linalg.eigh(covariance)
     return JointCentres(shift, axes * np.sqrt(np.maximum(spread, 0.0)), prior.elongation, True)
 

@@ -24,6 +24,7 @@ from ..analysis import (
     students_t,
     uncertainty,
 )
+from ..analysis.joint_centres import JointCentres
 from ..errors import BadInput, Text
 from ..io import resample
 from ..io.dataset import Dataset, load_dataset
@@ -213,6 +214,8 @@ class PassiveMoments(Tabular):
         For every pair of joints that were each moved while the other was held: their coupling from both.
     checks : tuple of Check
         Whether the muscles were silent and the movement slow.
+    centres : tuple of str
+        Where the joints are, if the path of a robot shows it.
     """
 
     trials: tuple[TrialMoments, ...]
@@ -223,6 +226,7 @@ class PassiveMoments(Tabular):
     couplings: tuple[joint_coupling.Coupling, ...] = ()
     dependence: tuple[joint_coupling.Dependence, ...] = ()
     checks: tuple[passivity_checks.Check, ...] = ()
+    centres: tuple[str, ...] = ()
 
     method: ClassVar[str] = "passive"
     level: ClassVar[float] = LEVEL
@@ -337,7 +341,7 @@ def passive_moments(
         repeats = [m for m in trials if m.trial.configuration == configuration]
         lost = []
         for joint in range(dataset.model.n_joints):
-            curve = _curve(dataset, repeats, (joint, centres), bins)
+            curve = _curve(dataset, repeats, joint, bins, centres)
             if curve is not None:
                 curves.append(curve)
             elif any(directions.moves(m.q[:, joint]) for m in repeats):
@@ -361,7 +365,7 @@ def passive_moments(
         for other in fitted
         if (one.joint, one.adjacent) == (other.adjacent, other.joint) and one.joint < other.joint
     )
-    return PassiveMoments(trials, tuple(curves), cutoff, tuple(warnings), given, both, fitted, assumptions)
+    return PassiveMoments(trials, tuple(curves), cutoff, tuple(warnings), given, both, fitted, assumptions, centres.lines(given.model))
 
 
 def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[TrialMoments, ...], list[str]]:
@@ -440,10 +444,7 @@ def _carried(unit: _armrs.Arm, q: np.ndarray, acceleration: np.ndarray) -> np.nd
     return np.asarray(acceleration[:, :1] * unit.gravity(turned) + acceleration[:, 1:] * unit.gravity(q))
 
 
-def _curve(
-    dataset: Dataset, repeats: Sequence[TrialMoments], which: tuple[int, joint_centres.JointCentres], bins: int
-) -> PassiveCurve | None:
-    joint, centres = which
+def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int, centres: JointCentres) -> PassiveCurve | None:
     moving = [m.direction[:, joint] != 0 for m in repeats]
     samples = [m.q[keep, joint] for m, keep in zip(repeats, moving, strict=True)]
     angles = np.concatenate(samples)
@@ -487,7 +488,7 @@ def _curve(
 
 
 def _systematic(
-    dataset: Dataset, repeats: Sequence[TrialMoments], spring: tuple[int, float], edges: np.ndarray, centres: joint_centres.JointCentres
+    dataset: Dataset, repeats: Sequence[TrialMoments], spring: tuple[int, float], edges: np.ndarray, centres: JointCentres
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what errors that all samples of all repeats share do to elastic mean and half width, each (n_errors, n_bins).
 
@@ -499,7 +500,7 @@ def _systematic(
 
 
 def _shifts(
-    dataset: Dataset, moments: TrialMoments, spring: tuple[int, float], edges: np.ndarray, centres: joint_centres.JointCentres
+    dataset: Dataset, moments: TrialMoments, spring: tuple[int, float], edges: np.ndarray, centres: JointCentres
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what each shared error of its size does to the moment of a repeat, by direction, each (n_errors, n_bins)."""
     model, joint = dataset.model_of(moments.trial.configuration), spring[0]
