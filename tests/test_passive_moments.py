@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 
 import armrs
 from armrs import Dataset, Trial
-from armrs.analysis import joint_centres, passivity_checks, uncertainty
+from armrs.analysis import passivity_checks, uncertainty
 from armrs.analysis.double_exponential import Course
 from armrs.analysis.joint_coupling import fit
 from armrs.workflows import passive
@@ -191,40 +190,3 @@ def test_the_result_says_it_all(session: Dataset, tmp_path: Path) -> None:
     assert any(path.name == "dependence-2.png" for path in written)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Own and adjacent angle" in page and "Slow enough" in page
-
-
-def _misplaced(data: armrs.Dataset, draw: np.random.Generator) -> armrs.Dataset:
-    """Return a session whose markers sit beside the joints, on trunk and segments, and are carried along by the skin."""
-    n, lengths = data.model.n_joints, np.array([s.length for s in data.model.segments])
-    offsets = uncertainty.LENGTH_STD / np.sqrt(2.0) * draw.standard_normal((n + 1, 2))
-    skin = joint_centres.SKIN_STD * draw.standard_normal((n, 2))
-    angles, distances = [], []
-    for trial in data.trials:
-        q, at = trial.q, np.zeros((len(trial.q), 2))
-        markers = [at + offsets[0] + skin[0] * (q[:, :1] + 0.5 * np.pi)]
-        for k, direction in enumerate(np.exp(1j * np.cumsum(q, axis=1)).T):
-            at = at + lengths[k] * np.column_stack([direction.real, direction.imag])
-            beside = offsets[k + 1] + (skin[k + 1] * q[:, [k + 1]] if k + 1 < n else np.zeros((len(q), 2)))
-            turned = (beside[:, 0] + 1j * beside[:, 1]) * direction
-            markers.append(at + np.column_stack([turned.real, turned.imag]))
-        apart = np.diff(np.stack(markers, axis=1), axis=1)
-        distances.append(np.linalg.norm(apart, axis=2))
-        angles.append(np.diff(np.unwrap(np.arctan2(apart[:, :, 1], apart[:, :, 0]), axis=0), axis=1, prepend=0.0))
-    more = np.concatenate(distances).mean(axis=0) - lengths
-    trials = tuple(dataclasses.replace(t, q=q) for t, q in zip(data.trials, angles, strict=True))
-    return data.replace(model=joint_centres.lengthened(data.model, more), trials=trials)
-
-
-def test_what_a_history_allows_for_markers_is_what_misplaced_markers_do() -> None:
-    """A history called 15 of 20 patients changed whose markers alone had been placed anew. Here they are misplaced at random, and the
-    passive moments computed again, without a robot whose path shows where the joints are."""
-    data = check_passive.session([check_passive.configurations(0.0)[1]], 121, 0.0, 0.0)
-    data = data.replace(trials=data.trials[:2])
-    draw = np.random.default_rng(7)
-    told = next(c for c in armrs.passive_moments(data).curves if c.joint == 2).placed()
-    found = []
-    for _ in range(60):
-        curve = next(c for c in armrs.passive_moments(_misplaced(data, draw)).curves if c.joint == 2)
-        found.append((curve._means("half_width").mean(), curve.stiffness().mean()))
-    # The standard deviation of 60 draws is itself known to 9 %.
-    np.testing.assert_allclose([told["half_width"], told["stiffness"]], np.std(found, axis=0, ddof=1), rtol=0.3)
