@@ -9,6 +9,7 @@ for markers alone). What the path does not determine keeps its prior uncertainty
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -156,30 +157,28 @@ def _turns(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _fitted(dataset: Dataset, trials: Sequence[Trial], elongation: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the most probable errors and their covariance, by least squares on the path of the handle with `sizes` as prior."""
-    rows, distances, weights = [], [], []
-    postures = {name: sum(t.configuration == name for t in trials) for name in (t.configuration for t in trials)}
+    repeats = Counter(t.configuration for t in trials)
     tolerance, free = dataset.tolerance, len(sizes)
-    nuisance = np.array(
-        [_BASE_STD] * 2 + [_COMPLIANCE_STD] * 2 + [tolerance.time_delay_s] + [tolerance.handle_placement_m] * 2 * len(trials)
-    )
-    for number, trial in enumerate(trials):
-        model = dataset.model_of(trial.configuration)
-        beside, own, others = _path(model, trial, elongation, 4 * _POSTURES)
-        row = np.zeros((*beside.shape, free + len(nuisance)))
-        row[:, :, :free], row[:, :, free : free + 5] = own, others
-        row[:, :, free + 5 + 2 * number : free + 7 + 2 * number] = np.eye(2)
-        rows.append(row.reshape(-1, row.shape[2]))
-        distances.append(beside.ravel())
-        weights.append(np.full(beside.size, _POSTURES / max(postures[trial.configuration] * len(beside), 1)))
-    matrix, distance, weight = np.concatenate(rows), np.concatenate(distances), np.concatenate(weights)
-    scale = np.concatenate([sizes, nuisance])
-    matrix = matrix * scale
-    scatter = _PATH_STD
+    scale = np.concatenate([sizes, [_BASE_STD] * 2, [_COMPLIANCE_STD] * 2, [tolerance.time_delay_s]])
+    paths = []
+    for trial in trials:
+        beside, own, others = _path(dataset.model_of(trial.configuration), trial, elongation, 4 * _POSTURES)
+        if len(beside):
+            weight = _POSTURES / (repeats[trial.configuration] * len(beside))
+            paths.append((weight, np.concatenate([own, others], axis=2) * scale, beside))
+    scatter, solution, precision = _PATH_STD, np.zeros(len(scale)), np.eye(len(scale))
     for _ in range(_ITERATIONS):
-        precision = np.eye(len(scale)) + (matrix.T * weight) @ matrix / scatter**2
-        solution = np.linalg.solve(precision, (matrix.T * weight) @ distance / scatter**2)
-        left = distance - matrix @ solution
-        scatter = max(_PATH_STD, float(np.sqrt(np.sum(weight * left**2) / np.sum(weight))))
+        precision, moment = np.eye(len(scale)), np.zeros(len(scale))
+        # The hand is displaced in the handle by the same in all samples of a trial.
+        held = [1.0 / (1.0 + scatter**2 / (weight * len(d) * tolerance.handle_placement_m**2 + 1e-300)) for weight, _, d in paths]
+        for (weight, rows, distance), share in zip(paths, held, strict=True):
+            mean, factor = rows.mean(axis=0), weight / scatter**2
+            precision += factor * (np.einsum("tip,tiq->pq", rows, rows) - share * len(rows) * mean.T @ mean)
+            moment += factor * (np.einsum("tip,ti->p", rows, distance) - share * len(rows) * mean.T @ distance.mean(axis=0))
+        solution = np.linalg.solve(precision, moment)
+        left = [d - rows @ solution for _, rows, d in paths]
+        squares = sum(w * np.sum((e - share * e.mean(axis=0)) ** 2) for (w, _, _), share, e in zip(paths, held, left, strict=True))
+        scatter = max(_PATH_STD, float(np.sqrt(squares / sum(w * d.size for w, _, d in paths))))
     covariance = np.linalg.inv(precision)
     return (scale * solution)[:free], (scale[:, None] * covariance * scale)[:free, :free]
 
