@@ -168,13 +168,13 @@ def _fitted(dataset: Dataset, trials: Sequence[Trial], elongation: np.ndarray, s
             paths.append((weight, np.concatenate([own, others], axis=2) * scale, beside))
     scatter, solution, precision = _PATH_STD, np.zeros(len(scale)), np.eye(len(scale))
     for _ in range(_ITERATIONS):
-        precision, moment = np.eye(len(scale)), np.zeros(len(scale))
+        precision, moment = np.eye(len(scale)), np.zeros_like(scale)
         # The hand is displaced in the handle by the same in all samples of a trial.
         held = [1.0 / (1.0 + scatter**2 / (weight * len(d) * tolerance.handle_placement_m**2 + 1e-300)) for weight, _, d in paths]
         for (weight, rows, distance), share in zip(paths, held, strict=True):
             mean, factor = rows.mean(axis=0), weight / scatter**2
             precision += factor * (np.einsum("tip,tiq->pq", rows, rows) - share * len(rows) * mean.T @ mean)
-            moment += factor * (np.einsum("tip,ti->p", rows, distance) - share * len(rows) * mean.T @ distance.mean(axis=0))
+            moment = moment + factor * (np.einsum("tip,ti->p", rows, distance) - share * len(rows) * mean.T @ distance.mean(axis=0))
         solution = np.linalg.solve(precision, moment)
         left = [d - rows @ solution for _, rows, d in paths]
         squares = sum(w * np.sum((e - share * e.mean(axis=0)) ** 2) for (w, _, _), share, e in zip(paths, held, left, strict=True))
