@@ -156,6 +156,7 @@ mass = 0.193
 [sensors]
 rate_Hz = 200
 marker_offset_m = 0.0014
+marker_skin_m_rad = 0.002
 emg = true
 
 [variation]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 from pathlib import Path
 
@@ -191,28 +190,3 @@ def test_the_result_says_it_all(session: Dataset, tmp_path: Path) -> None:
     assert any(path.name == "dependence-2.png" for path in written)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Own and adjacent angle" in page and "Slow enough" in page
-
-
-def test_what_a_history_allows_for_markers_is_what_misplaced_markers_do() -> None:
-    """A history called 15 of 20 patients changed whose markers alone had been placed anew. Here they are misplaced at random, with
-    lengths that follow from them, and the passive moments computed again."""
-    data = check_passive.session([check_passive.configurations(0.0)[1]], 121, 0.0, 0.0)
-    data = data.replace(trials=data.trials[:2])
-    draw, size = np.random.default_rng(7), uncertainty.LENGTH_STD
-    told = next(c for c in armrs.passive_moments(data).curves if c.joint == 2).placed()
-
-    def misplaced(trial: armrs.Trial, markers: np.ndarray) -> armrs.Trial:
-        absolute = np.cumsum(trial.q, axis=1)
-        lengths = np.array([s.length for s in data.model.segments])
-        absolute = absolute + (np.cos(absolute) * markers[1] - np.sin(absolute) * markers[0]) / lengths
-        return dataclasses.replace(trial, q=np.diff(absolute, axis=1, prepend=0.0))
-
-    found = []
-    for _ in range(60):
-        markers, longer = size * draw.standard_normal((2, 2)), size * draw.standard_normal(2)
-        segments = tuple(s.replace(length=s.length + more) for s, more in zip(data.model.segments, longer, strict=True))
-        other = data.replace(model=data.model.replace(segments=segments), trials=tuple(misplaced(t, markers) for t in data.trials))
-        curve = next(c for c in armrs.passive_moments(other).curves if c.joint == 2)
-        found.append((curve._means("half_width").mean(), curve.stiffness().mean()))
-    # The standard deviation of 60 draws is itself known to 9 %.
-    np.testing.assert_allclose([told["half_width"], told["stiffness"]], np.std(found, axis=0, ddof=1), rtol=0.3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -100,6 +101,26 @@ def test_the_markers_written_show_the_angles_recorded(experiment: Path, tmp_path
     assert np.isnan(markers.positions).any()
     motion = armrs.planar_motion(markers, ["shoulder", "elbow", "handle"], up="z", forward="y")
     np.testing.assert_allclose(motion.q, done.dataset.trials[0].q, atol=1e-12)
+
+
+def test_markers_move_with_their_segments_and_the_skin_of_the_next_joint(experiment: Path) -> None:
+    """They were shifted in the laboratory's frame, as no marker is."""
+    asked = load_experiment(experiment)
+
+    def seen(**devices: float) -> tuple[np.ndarray, np.ndarray]:
+        exact = dataclasses.replace(asked.devices, **({"marker_noise_m": 0.0, "marker_gaps": 0.0} | devices))
+        markers = measure(dataclasses.replace(asked, devices=exact)).markers["trials/slow_1.csv"]
+        at = markers.positions[:, :, 1] + 1j * markers.positions[:, :, 2]
+        return at, np.angle(np.diff(at, axis=1))
+
+    there, angle = seen()
+    # In the frames of trunk, upper arm and forearm.
+    turned = np.exp(-1j * np.column_stack([np.zeros(len(angle)), angle]))
+    placed, carried = ((seen(**d)[0] - there) * turned for d in ({"marker_offset_m": 0.01}, {"marker_skin_m_rad": 0.01}))
+    assert np.abs(placed - placed[0]).max() < 1e-12 < 1e-3 < np.abs(placed[0]).min()
+    bent = np.column_stack([angle[:, 0] + 0.5 * np.pi, angle[:, 1] - angle[:, 0]])
+    slopes = carried[:, :2] / bent
+    assert np.abs(slopes - slopes[0]).max() < 1e-9 < 1e-3 < np.abs(slopes[0]).min() and np.abs(carried[:, 2]).max() < 1e-12
 
 
 def test_the_same_seed_gives_the_same_bytes(experiment: Path, tmp_path: Path) -> None:

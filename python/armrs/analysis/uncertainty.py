@@ -97,47 +97,32 @@ def sensitivity(model: Model, q: np.ndarray, force: np.ndarray | None, deviation
     return np.array(rows)
 
 
-def angle_errors(model: Model, q: np.ndarray, deviations: Deviations, *, markers: bool) -> np.ndarray:
-    """Return what errors of one standard deviation do to the angles along a motion, shape (n_errors, n, n_joints) [rad].
-
-    A marker that sits beside its joint by `LENGTH_STD` along y or z turns the line to the next one by `(cos θ δz − sin θ δy) / length`,
-    θ the angle of the segment from +Y: it misreads speeds as well as angles. What the declared offset of an angle has beyond that is
-    constant.
-    """
-    absolute, n = np.cumsum(q, axis=1), model.n_joints
-    errors = np.zeros((3 * n, *q.shape))
-    for k, segment in enumerate(model.segments if markers else ()):
-        for row, turned in ((2 * k, -np.sin(absolute[:, k])), (2 * k + 1, np.cos(absolute[:, k]))):
-            errors[row, :, k] = turned * LENGTH_STD / segment.length
-            if k + 1 < n:
-                errors[row, :, k + 1] = -errors[row, :, k]
-    beyond = np.sqrt(np.maximum(deviations.angle**2 - np.sum(errors**2, axis=0).mean(axis=0), 0.0))
-    errors[2 * n :] = (beyond * np.eye(n))[:, None]
-    return errors
-
-
 def placements(
-    model: Model, q: np.ndarray, force: np.ndarray | None, deviations: Deviations, declared: np.ndarray, spring: tuple[int, float]
+    model: Model, q: np.ndarray, force: np.ndarray | None, unknown: tuple[np.ndarray, np.ndarray], spring: tuple[int, float]
 ) -> np.ndarray:
-    """Return the effect of misplaced markers on the moment of a joint at the angles from them, shape (4 n_joints, n) [N m].
+    """Return the effect of misplaced markers on the moment of a joint at the angles from them, shape (n_errors, n) [N m].
 
     Lengths and angles follow from markers. A misread angle also moves the moment to another angle, by the slope of the moment.
 
     Parameters
     ----------
-    model, q, force, deviations
-        As for `sensitivity`.
-    declared : ndarray
-        What that returned.
+    model, q, force
+        As for `moments`.
+    unknown : (ndarray, ndarray)
+        Errors of angles, (n_errors, n, n_joints) [rad], and of lengths, (n_errors, n_joints) [m], of one standard deviation.
     spring : (int, float)
         The joint, from 0, and the slope of its moment [N m/rad].
     """
     joint, stiffness = spring
-    n, none = model.n_joints, np.zeros(len(declared))
-    turned = angle_errors(model, q, deviations, markers=force is not None)
-    here = moments(model, q, force, none)[:, joint]
-    misread = [here - moments(model, q - e, force, none)[:, joint] - stiffness * e[:, joint] for e in turned]
-    return np.concatenate([declared[2 * n : 3 * n, :, joint], misread])
+    n = model.n_joints
+    exact = np.zeros(4 * n + 4)
+    here = moments(model, q, force, exact)[:, joint]
+    found = []
+    for turned, longer in zip(*unknown, strict=True):
+        true = exact.copy()
+        true[2 * n : 3 * n] = -longer
+        found.append(here - moments(model, q - turned, force, true)[:, joint] - stiffness * turned[:, joint])
+    return np.array(found).reshape(-1, len(q))
 
 
 def by_jacobian(parts: np.ndarray) -> np.ndarray:

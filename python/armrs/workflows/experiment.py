@@ -82,7 +82,9 @@ class Devices:
     marker_noise_m : float
         Of each coordinate of each marker.
     marker_offset_m : float
-        Standard deviation of where a marker sits against its joint, one draw for a session.
+        Standard deviation of where a marker sits against its joint, along and across its segment, one draw for a session.
+    marker_skin_m_rad : float
+        Standard deviation of how far skin carries a marker along and across its segment, for each radian of the next joint, likewise.
     marker_gaps : float
         Share of the samples at which a marker is hidden, in gaps of a tenth of a second.
     brake_noise_Nm : float, optional
@@ -102,6 +104,7 @@ class Devices:
     moment_noise_Nm: float | None = None
     marker_noise_m: float = 0.0002
     marker_offset_m: float = 0.0
+    marker_skin_m_rad: float = 0.0
     marker_gaps: float = 0.0
     brake_noise_Nm: float | None = None
     emg: bool = False
@@ -444,7 +447,7 @@ def _settings(kind: Any, place: str, table: object) -> Any:
 
 _MOST = {
     "force_noise_N": (100.0, "N"), "moment_noise_Nm": (100.0, "N m"), "brake_noise_Nm": (100.0, "N m"),
-    "marker_noise_m": (0.1, "m"), "marker_offset_m": (0.1, "m"), "clock_jitter_s": (1.0, "s"),
+    "marker_noise_m": (0.1, "m"), "marker_offset_m": (0.1, "m"), "marker_skin_m_rad": (0.1, "m/rad"), "clock_jitter_s": (1.0, "s"),
 }  # fmt: skip
 """Of the deviations: far beyond any device, and small enough that what is recorded are forces and places."""
 

@@ -14,6 +14,7 @@ import numpy as np
 from .. import _armrs, checks
 from ..analysis import (
     double_exponential,
+    joint_centres,
     joint_coupling,
     low_pass,
     motion_direction,
@@ -23,6 +24,7 @@ from ..analysis import (
     students_t,
     uncertainty,
 )
+from ..analysis.joint_centres import JointCentres
 from ..errors import BadInput, Text
 from ..io import resample
 from ..io.dataset import Dataset, load_dataset
@@ -212,6 +214,8 @@ class PassiveMoments(Tabular):
         For every pair of joints that were each moved while the other was held: their coupling from both.
     checks : tuple of Check
         Whether the muscles were silent and the movement slow.
+    centres : tuple of str
+        Where the joints are, if the path of a robot shows it.
     """
 
     trials: tuple[TrialMoments, ...]
@@ -222,6 +226,7 @@ class PassiveMoments(Tabular):
     couplings: tuple[joint_coupling.Coupling, ...] = ()
     dependence: tuple[joint_coupling.Dependence, ...] = ()
     checks: tuple[passivity_checks.Check, ...] = ()
+    centres: tuple[str, ...] = ()
 
     method: ClassVar[str] = "passive"
     level: ClassVar[float] = LEVEL
@@ -324,6 +329,8 @@ def passive_moments(
     cutoff = checks.number("cutoff", cutoff, least=LEAST_CUTOFF, unit="Hz")
     tell = checks.progress(progress)
     refuse_implausible(dataset)
+    given, centres = dataset, joint_centres.find(dataset)
+    dataset = centres.applied(given)
     trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
     trials, conditioned = _without_preconditioning(trials)
     wrong = find_wrong_setup(dataset)
@@ -334,7 +341,7 @@ def passive_moments(
         repeats = [m for m in trials if m.trial.configuration == configuration]
         lost = []
         for joint in range(dataset.model.n_joints):
-            curve = _curve(dataset, repeats, joint, bins)
+            curve = _curve(dataset, repeats, joint, bins, centres)
             if curve is not None:
                 curves.append(curve)
             elif any(motion_direction.moves(m.q[:, joint]) for m in repeats):
@@ -358,7 +365,7 @@ def passive_moments(
         for other in fitted
         if (one.joint, one.adjacent) == (other.adjacent, other.joint) and one.joint < other.joint
     )
-    return PassiveMoments(trials, tuple(curves), cutoff, tuple(warnings), dataset, both, fitted, assumptions)
+    return PassiveMoments(trials, tuple(curves), cutoff, tuple(warnings), given, both, fitted, assumptions, centres.lines(given.model))
 
 
 def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[TrialMoments, ...], list[str]]:
@@ -437,7 +444,7 @@ def _carried(unit: _armrs.Arm, q: np.ndarray, acceleration: np.ndarray) -> np.nd
     return np.asarray(acceleration[:, :1] * unit.gravity(turned) + acceleration[:, 1:] * unit.gravity(q))
 
 
-def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int) -> PassiveCurve | None:
+def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int, centres: JointCentres) -> PassiveCurve | None:
     moving = [m.direction[:, joint] != 0 for m in repeats]
     samples = [m.q[keep, joint] for m, keep in zip(repeats, moving, strict=True)]
     angles = np.concatenate(samples)
@@ -453,7 +460,7 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     # A mean over other repeats at the next angle would jump by what differs between them.
     shared = np.isfinite(elastic[np.isfinite(elastic).any(axis=1)]).all(axis=0)
     kept = np.where(shared, 0.0, np.nan) if shared.any() else np.zeros(bins)
-    errors = _systematic(dataset, repeats, joint, edges, repeat_statistics.slope(repeat_statistics.mean(elastic), edges))
+    errors = _systematic(dataset, repeats, (joint, repeat_statistics.slope(repeat_statistics.mean(elastic), edges)), edges, centres)
     declared = len(uncertainty.Deviations.of(dataset).vector(dataset.model.n_joints))
     systematic = [part[:declared] for part in errors]
     moved = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
@@ -481,31 +488,29 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
 
 
 def _systematic(
-    dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, edges: np.ndarray, stiffness: float
+    dataset: Dataset, repeats: Sequence[TrialMoments], spring: tuple[int, float], edges: np.ndarray, centres: JointCentres
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what errors that all samples of all repeats share do to elastic mean and half width, each (n_errors, n_bins).
 
     First those that are declared, as `Deviations.vector` orders them, then those of `uncertainty.placements`.
     """
-    deviations = uncertainty.Deviations.of(dataset)
-    parts = [_shifts(dataset, m, (joint, stiffness), edges, deviations) for m in repeats]
-    rising, falling = (
-        np.array([repeat_statistics.mean(errors) for errors in np.stack([part[k] for part in parts], axis=1)]) for k in (0, 1)
-    )
+    parts = [_shifts(dataset, m, spring, edges, centres) for m in repeats]
+    rising, falling = (np.array([repeat_statistics.mean(errors) for errors in np.stack(each, axis=1)]) for each in zip(*parts, strict=True))
     return 0.5 * (rising + falling), 0.5 * (rising - falling)
 
 
 def _shifts(
-    dataset: Dataset, moments: TrialMoments, spring: tuple[int, float], edges: np.ndarray, deviations: uncertainty.Deviations
+    dataset: Dataset, moments: TrialMoments, spring: tuple[int, float], edges: np.ndarray, centres: JointCentres
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what each shared error of its size does to the moment of a repeat, by direction, each (n_errors, n_bins)."""
     model, joint = dataset.model_of(moments.trial.configuration), spring[0]
     there = np.isfinite(moments.q).all(axis=1) & (moments.direction[:, joint] != 0)
-    values = np.full((len(deviations.vector(model.n_joints)) + 4 * model.n_joints, len(moments.q)), np.nan)
+    deviations = uncertainty.Deviations.of(dataset)
+    values = np.full((len(deviations.vector(model.n_joints)) + centres.factor.shape[1], len(moments.q)), np.nan)
     if there.any():
         force = None if moments.force is None else moments.force[there]
         declared = uncertainty.sensitivity(model, moments.q[there], force, deviations)
-        placed = uncertainty.placements(model, moments.q[there], force, deviations, declared, spring)
+        placed = uncertainty.placements(model, moments.q[there], force, centres.unknown(model, moments.q[there]), spring)
         values[:, there] = np.concatenate([declared[:, :, joint], placed])
     rising, falling = (np.array([_binned(moments, row, joint, sign, edges) for row in values]) for sign in (1, -1))
     return rising, falling

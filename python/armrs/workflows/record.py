@@ -244,7 +244,9 @@ class _Session:
     def __init__(self, experiment: Experiment) -> None:
         self.experiment = experiment
         draw = np.random.default_rng([experiment.seed, 1])
-        self.offsets = experiment.devices.marker_offset_m * draw.standard_normal((experiment.truth.n_joints + 1, 2))
+        n, devices = experiment.truth.n_joints, experiment.devices
+        self.offsets = devices.marker_offset_m * draw.standard_normal((n + 1, 2))
+        self.skin = devices.marker_skin_m_rad * draw.standard_normal((n, 2))
 
     def measure(self, run: Run, number: int, repeat: int) -> _MeasuredRun:
         """Measure one trial; its random numbers depend on seed, movement and repeat alone."""
@@ -392,19 +394,32 @@ class _Session:
         return trial if len(stamps) >= FEWEST_SAMPLES else None, markers
 
     def _markers(self, model: Model, t: np.ndarray, q: np.ndarray, draw: np.random.Generator) -> Markers:
-        """Return the positions of the joints as the cameras measure them: x (normal to the plane), y, z [m]."""
+        """Return the positions of the joints as the cameras measure them: x (normal to the plane), y, z [m].
+
+        The marker of the first joint sits on the trunk, the one at the end of a segment on this segment. Skin that moves with the next
+        joint carries it along, from the hanging stretched arm on; the handle has no skin.
+        """
         absolute = np.cumsum(q, axis=1)
         at = np.tile(np.array(model.base), (len(t), 1))
         points = [at]
         for segment, angle in zip(model.segments, absolute.T, strict=True):
             at = at + segment.length * np.column_stack([np.cos(angle), np.sin(angle)])
             points.append(at)
+        beside = np.tile(self.offsets, (len(t), 1, 1))
+        beside[:, :-1] += (q + 0.5 * np.pi * np.eye(1, q.shape[1]))[:, :, None] * self.skin
         positions = np.zeros((len(t), len(points), 3))
-        positions[:, :, 1:] = np.stack(points, axis=1) + self.offsets
+        positions[:, :, 1:] = np.stack(points, axis=1) + np.stack([beside[:, 0], *_turned(beside[:, 1:], absolute)], axis=1)
         devices = self.experiment.devices
         positions += devices.marker_noise_m * draw.standard_normal(positions.shape)
         _hide(positions, devices, draw)
         return Markers([*_POINTS[: len(points) - 1], _POINTS[-1]], t, positions, up="z")
+
+
+def _turned(vectors: np.ndarray, absolute: np.ndarray) -> list[np.ndarray]:
+    """Return vectors in the frames of segments, (n, n_joints, 2), in the plane: one (n, 2) a segment."""
+    cosine, sine = np.cos(absolute), np.sin(absolute)
+    y, z = cosine * vectors[:, :, 0] - sine * vectors[:, :, 1], sine * vectors[:, :, 0] + cosine * vectors[:, :, 1]
+    return [np.column_stack(pair) for pair in zip(y.T, z.T, strict=True)]
 
 
 def _hide(positions: np.ndarray, devices: Devices, draw: np.random.Generator) -> None:

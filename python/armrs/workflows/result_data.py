@@ -159,6 +159,7 @@ def passive_data(result: PassiveMoments, command: str | None = None) -> dict[str
     return {
         "verb": "passive",
         "data": data_of(result.dataset),
+        "joint_centres": list(result.centres),
         "cutoff_Hz": result.cutoff,
         "curves": curves,
         "dependence": [

@@ -11,11 +11,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _armrs, checks
-from ..analysis import stretch_reflex
+from ..analysis import joint_centres, stretch_reflex
 from ..analysis.motion_direction import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
 from ..analysis.stretch_reflex import Reflex, Stretch
-from ..analysis.uncertainty import Deviations, angle_errors, sensitivity
+from ..analysis.uncertainty import Deviations, sensitivity
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
 from ..io.muscle_activity import co_contraction, onset
@@ -215,6 +215,8 @@ def spasticity(
     cutoff = min(cutoff, 0.4 * slowest)
     tell = checks.progress(progress)
     refuse_implausible(dataset)
+    given, centres = dataset, joint_centres.find(dataset)
+    dataset = centres.applied(given)
     # Samples with muscle activity count here.
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
     # Torques of the contact are products of forces with angles: the low-pass comes after them.
@@ -222,7 +224,7 @@ def spasticity(
     found, warnings = [], []
     for joint in range(dataset.model.n_joints):
         tell(f"reflexes of the {dataset.model.joints[joint].name}", joint / dataset.model.n_joints)
-        own = [(m, s) for m, fine in moments if (s := _stretch(dataset, m, joint, cutoff, fine)) is not None]
+        own = [(m, s) for m, fine in moments if (s := _stretch((dataset, centres), m, joint, cutoff, fine)) is not None]
         speeds = [float(np.abs(s.qd).max()) for _, s in own]
         if len(own) < stretch_reflex.FEWEST or max(speeds) < LEAST_SPEEDS * min(speeds):
             continue
@@ -235,7 +237,7 @@ def spasticity(
     if not found:
         need = f"{stretch_reflex.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
         raise BadInput("trials", Text("no joint that is stretched at several speeds"), need)
-    return Spasticity(tuple(found), cutoff, tuple(warnings), dataset)
+    return Spasticity(tuple(found), cutoff, tuple(warnings), given)
 
 
 def _moments(dataset: Dataset, trial: Trial, cutoff: float) -> tuple[TrialMoments, float]:
@@ -247,8 +249,11 @@ def _moments(dataset: Dataset, trial: Trial, cutoff: float) -> tuple[TrialMoment
     return trial_moments(dataset, trial, min(fine, most)), min(fine, most)
 
 
-def _stretch(dataset: Dataset, moments: TrialMoments, joint: int, cutoff: float, fine: float) -> Stretch | None:
+def _stretch(
+    session: tuple[Dataset, joint_centres.JointCentres], moments: TrialMoments, joint: int, cutoff: float, fine: float
+) -> Stretch | None:
     """Return one joint of a trial from its first to its last sample that was measured; None where it is held, or interrupted."""
+    dataset, centres = session
     there = np.flatnonzero(np.isfinite(moments.moment[:, joint]))
     if there.size < 3 or there[-1] - there[0] + 1 != there.size:
         return None
@@ -264,14 +269,13 @@ def _stretch(dataset: Dataset, moments: TrialMoments, joint: int, cutoff: float,
     model, smooth = dataset.model_of(moments.trial.configuration), low_pass(rate / every, cutoff)
     size, motion = Deviations.of(dataset), moments.q[there][::every]
     errors = sensitivity(model, motion, force, size)[:, :, joint]
-    # As `Deviations.vector` orders them: lengths and angles are those of the markers.
+    # As `Deviations.vector` orders them; lengths and angles are those of the joint centres.
     n = dataset.model.n_joints
     shared = np.array([smooth(e) for e in (*errors[: 2 * n], *errors[4 * n :])])
-    # A dynamometer reads the angle at its axis, without markers.
-    turned = angle_errors(model, motion, size, markers=force is not None)
-    still = [_moment(model, t, motion + error, force)[:, joint] for error in (np.zeros_like(motion), *turned)]
-    placed = np.array([smooth(e) for e in (*errors[2 * n : 3 * n], *(seen - still[0] for seen in still[1:]))])
-    misread = np.concatenate([np.zeros((n, len(t))), turned[:, :, joint]])
+    turned, longer = centres.unknown(model, motion)
+    still = _moment(model, t, motion, force)[:, joint]
+    moved = [_moment(joint_centres.lengthened(model, a), t, motion + e, force)[:, joint] for e, a in zip(turned, longer, strict=True)]
+    placed, misread = np.array([smooth(seen - still) for seen in moved]).reshape(-1, len(t)), turned[:, :, joint]
     coarser = low_pass(rate / every, 0.5 * fine)
     edge = min(round(EDGE * rate / (every * cutoff)), (len(t) - 3) // 2)
     return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, smooth, coarser, shared, placed, misread, edge)
