@@ -20,7 +20,7 @@ pub fn kinetic_energy<T: Scalar, const N: usize>(
     T::of(0.5) * twice
 }
 
-/// Potential energy of the weight relative to the base \[J\]; its gradient to `q` is [`gravity`](crate::dynamics::gravity).
+/// Potential energy of the weight relative to the base \[J\]; its gradient to `q` is [`gravity`](crate::gravity).
 pub fn potential_energy<T: Scalar, const N: usize>(chain: &Chain<T, N>, pose: &Pose<T, N>) -> T {
     let [gy, gz] = chain.gravity;
     let mut energy = T::ZERO;

@@ -56,7 +56,7 @@ fn link_force<T: Scalar, const N: usize>(
 
 /// Joint torques that move the arm with `qd`, `qdd`: `B q̈ + C q̇ + G` \[N m\].
 ///
-/// Equals [`regressor`](crate::dynamics::regressor) times the base parameters.
+/// Equals [`regressor`](crate::regressor) times the base parameters.
 pub fn inverse_dynamics<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,

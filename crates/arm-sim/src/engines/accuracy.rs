@@ -47,7 +47,7 @@ pub struct Resolved {
 ///
 /// # Errors
 /// [`SimulationError::Accuracy`] where the accuracy is not reached; [`SimulationError::Setting`] for an accuracy that is not positive or
-/// experiments that are recorded at every step; else as [`simulate`](crate::engines::simulate).
+/// experiments that are recorded at every step; else as [`simulate`](crate::simulate).
 ///
 /// ```
 /// use arm_sim::{sample_experiments, simulate_accurately};
