@@ -237,7 +237,7 @@ fn dry_joints<const N: usize>(hypothesis: &Hypothesis<N>) -> [bool; N] {
 mod tests {
     use arm_core::effect::{Effect, Kind};
 
-    use arm_core::models;
+    use arm_core::sample_arms;
     use arm_ident::regression::trial::Trial;
 
     use super::*;
@@ -281,7 +281,7 @@ mod tests {
             force_on_arm: Some(times().map(|t| [libm::sin(9.0 * t), 2.0]).collect()),
             ..Trial::new(100.0, q.collect())
         };
-        let mut session = of_one(models::mechanical_arm(), trial);
+        let mut session = of_one(sample_arms::mechanical_arm(), trial);
         session.comparison = ComparisonMode::Torque;
         session.effects = vec![Effect::new(Kind::Coulomb, 1).with(&[0.2, 0.01])];
         let noise = Noise::unknown(session.channels()).expect("white");
