@@ -76,6 +76,18 @@ def test_the_same_session_replaces_itself_and_order_is_by_date(identified: Ident
     assert all(c.dates == ("2026-01-01", "2026-03-01") and c.change == 0.0 for c in courses)
 
 
+def test_a_result_without_intervals_takes_no_place(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "subject.sqlite"
+    before = sessions.add(file, identified, "2026-03-01").courses
+    without = {
+        part: tuple(e.replace(interval=(np.nan, np.nan)) for e in getattr(identified, part)) for part in ("parameters", "combinations")
+    }
+    empty = dataclasses.replace(identified, result=identified.result.replace(**without))
+    (line,) = sessions.add(file, empty, "2026-03-01").warnings
+    assert "has an interval" in line
+    assert [(c.label, c.dates) for c in sessions.read(file).courses] == [(c.label, c.dates) for c in before]
+
+
 def test_a_session_in_another_unit_is_told(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A history whose units were altered was compared without these sessions, and nothing said so."""
     file = tmp_path / "s.sqlite"

@@ -172,6 +172,8 @@ def test_muscles_that_wake_up_are_seen() -> None:
     check = passivity_checks.muscles_silent([trial({"emg_biceps": quiet, "emg_triceps": burst})])
     assert check.passed is False and "emg_triceps rises to" in check.text and "of a.csv" in check.text
     assert passivity_checks.muscles_silent([trial({})]).passed is None
+    dead = passivity_checks.muscles_silent([trial({"emg_biceps": quiet, "emg_triceps": np.zeros(300)})])
+    assert dead.passed is None and "not recorded: emg_triceps" in dead.text
     assert passivity_checks.slow_enough([("a", 1, 0.02), ("b", 2, 0.3)]).passed is False
     assert passivity_checks.slow_enough([("a", 1, 0.02)]).passed is True
 

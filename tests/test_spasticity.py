@@ -14,6 +14,7 @@ import armrs
 import patients
 from armrs import BadInput
 from armrs.cli import main
+from armrs.io import tomlfile
 from armrs.io.muscle_activity import onset
 from armrs.model import Effect, Model
 from armrs.report import clinic_figures, plotting
@@ -123,6 +124,15 @@ def test_a_plan_of_stretches_expects_what_patients_scatter_by() -> None:
     assert 0.3 < planned.predictions[0].std / np.std(found, ddof=1) < 2.0
     with pytest.raises(BadInput, match="fastest stretch"):
         plan_stretches(model, dataclasses.replace(limits, speed=0.5), 1)
+
+
+def test_planned_stretches_are_toml(tmp_path: Path) -> None:
+    """Their accelerations are numbers of NumPy, which write their type."""
+    limits = Limits(((patients.LOW, patients.HIGH),), speed=4.0, acceleration=40.0)
+    arm, file = patients.arm(), tmp_path / "a.toml"
+    for movement in plan_stretches(Model(arm.segments, arm.joints), limits, 1).movements:
+        file.write_text(f"acceleration = {tomlfile.value(movement.acceleration)}\n", encoding="utf-8")
+        assert tomlfile.read(file)["acceleration"] == movement.acceleration
 
 
 def test_markers_at_the_axis_are_whole() -> None:

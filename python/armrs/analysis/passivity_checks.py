@@ -47,9 +47,12 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
     if not any(trial.emg for trial in trials):
         return Check("muscles silent", None, "No muscle activity was recorded: the muscles are assumed inactive.")
     worst: tuple[float, str, str, float] = (0.0, "", "", 0.0)
+    constant: set[str] = set()
     for trial in trials:
         width = max(1, round(WINDOW * trial.rate))
         for name, values in trial.emg.items():
+            if np.isfinite(values).any() and np.nanmin(values) == np.nanmax(values):
+                constant.add(name)
             judged = np.isfinite(values) & ~trial.active
             size = np.abs(values[judged])
             if len(size) < 2 * width:
@@ -67,6 +70,9 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
             False,
             f"Not silent: {name} rises to {ratio:.3g} times its median at {at_s:.3g} s of {file} (allowed {RISE:g}).",
         )
+    if constant:
+        names = ", ".join(sorted(constant))
+        return Check("muscles silent", None, f"Constant in a trial, so not recorded: {names}. Whether the muscles were silent is unknown.")
     return Check("muscles silent", True, f"Silent: no muscle rises above {ratio:.3g} times its median (allowed {RISE:g}).")
 
 

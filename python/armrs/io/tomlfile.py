@@ -93,8 +93,11 @@ def value(item: object) -> str:
     """Write one value; a float is written with all the digits that reading it back needs."""
     if isinstance(item, bool):
         return "true" if item else "false"
-    if isinstance(item, (int, float)):
-        return repr(item)
+    if isinstance(item, int):
+        return repr(int(item))
+    if isinstance(item, float):
+        # A float of NumPy is one too, and writes its type.
+        return repr(float(item))
     if isinstance(item, str):
         return '"' + "".join(_escape(c) for c in item) + '"'
     if isinstance(item, (list, tuple)):

@@ -294,6 +294,9 @@ def _foreseen(file: Path, result: Followed, subject: str, date: str) -> History:
                 connection.backup(memory)
         replaced = _write(memory, result, subject, date)
         found = _courses(memory, result.method)
+        if not any(map(_usable, result.followed())):
+            line = f"history: no quantity of {show(result.dataset.name)} on {date} has an interval (no repeats?): it is not added"
+            return replace(found, warnings=(*found.warnings, line))
         if not replaced:
             return found
         line = f"history: the former result of {show(result.dataset.name)} on {date} is replaced; another --date keeps both"
@@ -317,11 +320,13 @@ def _write(connection: sqlite3.Connection, result: Followed, subject: str, date:
 
 
 def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> bool:
+    estimates = {(e.name, e.kind, e.joint or 0): e for e in result.followed() if _usable(e)}
+    if not estimates:
+        return False
     key = (result.dataset.name, date, result.method)
     former = connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
     made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints))
-    estimates = {(e.name, e.kind, e.joint or 0): e for e in result.followed()}
-    rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items() if _usable(e)]
+    rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items()]
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
     return former.rowcount > 0
 
