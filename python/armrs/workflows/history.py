@@ -294,7 +294,7 @@ def _foreseen(file: Path, result: Followed, subject: str, date: str) -> History:
                 connection.backup(memory)
         replaced = _write(memory, result, subject, date)
         found = _courses(memory, result.method)
-        if not any(map(_usable, result.followed())):
+        if not _estimates(result):
             line = f"history: no quantity of {show(result.dataset.name)} on {date} has an interval (no repeats?): it is not added"
             return replace(found, warnings=(*found.warnings, line))
         if not replaced:
@@ -320,7 +320,7 @@ def _write(connection: sqlite3.Connection, result: Followed, subject: str, date:
 
 
 def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> bool:
-    estimates = {(e.name, e.kind, e.joint or 0): e for e in result.followed() if _usable(e)}
+    estimates = _estimates(result)
     if not estimates:
         return False
     key = (result.dataset.name, date, result.method)
@@ -329,6 +329,11 @@ def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> bool
     rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items()]
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
     return former.rowcount > 0
+
+
+def _estimates(result: Followed) -> dict[tuple[str, str, int], Estimate]:
+    """Return what is kept of a result, by name, kind and joint (0 for none): what has an interval."""
+    return {(e.name, e.kind, e.joint or 0): e for e in result.followed() if _usable(e)}
 
 
 def read(path: str | os.PathLike[str], method: str = "joint") -> History:

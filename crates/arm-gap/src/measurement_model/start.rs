@@ -128,12 +128,13 @@ impl<const N: usize> Session<N> {
         experiment: &Experiment<N>,
     ) -> Result<Start<N>, SimulationError> {
         let (near, friction) = self.at_start(hypothesis, course)?;
-        let mut resting = experiment.clone();
-        resting.effects = at_rest(&experiment.effects);
-        let creeps = resting.effects != experiment.effects;
+        let effects = at_rest(&experiment.effects);
+        let creeps = effects != experiment.effects;
         if !creeps && friction.iter().all(|&torque| torque == 0.0) {
             return Ok(Start::Equilibrium { near });
         }
+        let mut resting = experiment.clone();
+        resting.effects = effects;
         resting.start = Start::Equilibrium { near };
         resting.duration = resting.dt;
         resting.output_interval = None;
@@ -263,17 +264,21 @@ mod tests {
     use super::*;
     use crate::measurement_model::prediction::tests::of_one;
 
-    /// Three segments in whose null motion the last joint turns twenty times as far as the first, on a contact that bears 10 N forward.
-    #[test]
-    fn an_arm_with_dry_friction_starts_where_the_handle_has_its_hand() {
+    /// An arm without weight from its base on.
+    fn three_segments(base: Plane<f64>) -> Chain<f64, 3> {
         let segment = |length: f64| Segment {
             length,
             mass: 1.0,
             com: [0.5 * length, 0.0],
             inertia: 0.01,
         };
-        let segments = [0.3, 0.25, 0.08].map(segment);
-        let chain = Chain::new(segments, [0.0, -9.81], [0.0; 2]).expect("an arm");
+        Chain::new([0.3, 0.25, 0.08].map(segment), base, [0.0; 2]).expect("an arm")
+    }
+
+    /// Three segments in whose null motion the last joint turns twenty times as far as the first, on a contact that bears 10 N forward.
+    #[test]
+    fn an_arm_with_dry_friction_starts_where_the_handle_has_its_hand() {
+        let chain = three_segments([0.0, -9.81]);
         let truth = Joints::from([-1.05, 1.03, 0.16]);
         let at = tip(&chain, &Pose::new(&truth));
         let error = Joints::from([1e-3, -2e-3, 1e-3]);
@@ -302,14 +307,7 @@ mod tests {
     /// Three segments with a spring in the last joint that turns it by 0.54 rad where nothing holds it.
     #[test]
     fn a_joint_that_creeps_starts_where_it_is_measured() {
-        let segment = |length: f64| Segment {
-            length,
-            mass: 1.0,
-            com: [0.5 * length, 0.0],
-            inertia: 0.01,
-        };
-        let segments = [0.3, 0.25, 0.08].map(segment);
-        let chain = Chain::new(segments, [0.0; 2], [0.0; 2]).expect("an arm");
+        let chain = three_segments([0.0; 2]);
         let measured = Joints::from([-1.05, 1.03, 0.16]);
         let at = tip(&chain, &Pose::new(&measured));
         let trial = Trial {

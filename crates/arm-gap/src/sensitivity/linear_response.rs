@@ -92,7 +92,7 @@ impl<const N: usize> Linear<'_, N> {
     ) -> Result<Channels, SimulationError> {
         let plant = Plant::new(self.session, &asked.changed, &self.course.rhythms)?;
         let nowhere = [Joints::<f64, N>::zeros(); 2];
-        let start = match origin.plant.dry || plant.dry || origin.plant.at_rest().dry {
+        let start = match plant.dry || origin.resting.dry {
             true => self.start_from(origin, &plant, &asked.changed)?,
             false => nowhere,
         };

@@ -12,6 +12,8 @@ use crate::sensitivity::plant::{Balance, Plant};
 /// A hypothesis from which changes are computed: that of the run, or one beside it.
 pub struct Origin<const N: usize> {
     pub(super) plant: Plant<N>,
+    /// The same at rest.
+    pub(super) resting: Plant<N>,
     /// Where it starts: the angles that are measured, and what dry friction resists with where the handle places a joint.
     pub(super) start: (Joints<f64, N>, Joints<f64, N>),
     /// What its sensors read of the motion of the run.
@@ -25,6 +27,7 @@ pub struct Origin<const N: usize> {
 impl<const N: usize> Origin<N> {
     pub(super) fn of(plant: Plant<N>, start: (Joints<f64, N>, Joints<f64, N>)) -> Self {
         Self {
+            resting: plant.at_rest(),
             plant,
             start,
             shown: Channels::new(),
@@ -35,6 +38,6 @@ impl<const N: usize> Origin<N> {
 
     /// The joints that dry friction holds where the run starts.
     pub(super) fn held_at_start(&self, motion: &Motion<f64, N>) -> [bool; N] {
-        held_at_start(&self.plant.at_rest().friction(motion, &[]))
+        held_at_start(&self.resting.friction(motion, &[]))
     }
 }
