@@ -3,6 +3,7 @@
 pub mod candidates;
 pub mod data;
 mod error;
+pub mod hypothesis;
 pub mod joint_torque;
 pub mod measurement_model;
 pub mod results;

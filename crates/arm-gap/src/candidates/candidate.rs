@@ -7,7 +7,7 @@ use crate::candidates::torque_step::{motions, torque_step};
 use crate::data::passive_law::Free;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 

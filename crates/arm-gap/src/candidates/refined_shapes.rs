@@ -4,9 +4,9 @@ use arm_core::effect::{Effect, Nature, Part};
 use arm_ident::regression::trial::Trial;
 use arm_numerics::statistics::extent::extent;
 
+use crate::data::course::BAND;
 use crate::data::session::Session;
 use crate::data::valid_segments::SAMPLES_PER_PERIOD;
-use crate::measurement_model::prediction::BAND;
 
 /// Largest speed below which a joint with dry friction creeps \[rad/s\]; what friction does below is how the joint rests, no law of its
 /// own.

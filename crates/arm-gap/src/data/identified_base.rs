@@ -16,10 +16,10 @@ use arm_ident::regression::unknown::spring;
 use arm_numerics::statistics::extent::extent;
 
 use crate::GapError;
+use crate::data::course::Course;
 use crate::data::joint_in_motion::{WithStd, in_motion, laws_in_motion};
 use crate::data::passive_law::{Free, LIKELY, Passive};
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
-use crate::measurement_model::prediction::Course;
 
 /// Noise of a joint's speed, as a share of the speed, above which the motion is simulated, as the measured motion of that joint is
 /// mostly noise. Below, measured motion is closer than a simulation without the missing effects.
@@ -296,7 +296,7 @@ mod tests {
     use arm_core::Joints;
 
     use super::*;
-    use crate::measurement_model::prediction::tests::resting;
+    use crate::data::course::tests::resting;
 
     #[test]
     fn a_joint_hardly_moves_up_to_a_hundredth_of_a_radian() {

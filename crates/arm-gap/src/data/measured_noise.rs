@@ -6,9 +6,9 @@ use arm_numerics::statistics::extent::extent;
 use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
+use crate::data::course::Channels;
 use crate::data::noise::{Noise, Thinned, dot};
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::prediction::Channels;
 use crate::selection::fit::{Fitted, decided};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::response::Response;

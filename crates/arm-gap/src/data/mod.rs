@@ -1,5 +1,9 @@
 //! Measured data, prepared: session, repeats, the samples that are compared, noise.
 
+pub(crate) mod base_path;
+pub(crate) mod contact_readings;
+pub mod course;
+pub(crate) mod handle_path;
 pub mod identified_base;
 mod joint_in_motion;
 mod measured_noise;

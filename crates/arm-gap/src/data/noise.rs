@@ -11,9 +11,9 @@ pub use arm_numerics::interleaved_dot as dot;
 use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effective_samples};
 
 use crate::GapError;
+use crate::data::course::{Channels, Course};
 use crate::data::valid_segments::{ObservableForce, SHORTEST, ValidSegments};
 use crate::data::whitening::{Observed, Whitening};
-use crate::measurement_model::prediction::{Channels, Course};
 
 /// Highest order of the autoregressions: every segment has as many samples.
 const ORDER: usize = SHORTEST;
@@ -380,7 +380,7 @@ mod tests {
     use rand_chacha::rand_core::{RngCore, SeedableRng};
 
     use super::*;
-    use crate::measurement_model::prediction::tests::resting;
+    use crate::data::course::tests::resting;
 
     #[test]
     fn samples_of_a_movement_whose_path_is_not_known_weigh_less() {

@@ -4,10 +4,10 @@ use arm_numerics::Matrix;
 
 use crate::GapError;
 use crate::candidates::library::Library;
+use crate::data::course::Channels;
 use crate::data::noise::{Noise, dot};
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::hypothesis::priors;
-use crate::measurement_model::prediction::Channels;
+use crate::hypothesis::priors;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::solve;
 use crate::sensitivity::response::Response;

@@ -5,12 +5,12 @@ use std::sync::{Arc, Mutex};
 use arm_ident::threads::parallel;
 
 use crate::GapError;
+use crate::data::course::{Channels, Course};
 use crate::data::noise::Noise;
 use crate::data::repeats::groups;
 use crate::data::session::Session;
 use crate::data::valid_segments::{ObservableForce, ValidSegments};
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::measurement_model::prediction::{Channels, Course};
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linearized_run::Linear;
 use crate::sensitivity::response::Response;
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use arm_ident::regression::trial::Trial;
 
-use crate::measurement_model::prediction::Course;
+use crate::data::course::Course;
 
 /// Root mean square distance between the paths of two trials that are the same movement \[m, rad\].
 const SAME_PATH: f64 = 0.01;
@@ -79,7 +79,7 @@ fn reach(path: &[Vec<f64>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement_model::prediction::tests::resting;
+    use crate::data::course::tests::resting;
 
     #[test]
     fn trials_whose_paths_lie_within_a_centimetre_repeat_one_movement() {

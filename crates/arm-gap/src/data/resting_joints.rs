@@ -5,11 +5,11 @@ use std::sync::Arc;
 use arm_core::effect::{Local, Place};
 use arm_core::{Pose, jacobian};
 
+use crate::data::course::Course;
 use crate::data::prepared_session::{PreparedSession, Rest};
 use crate::data::session::ComparisonMode;
 use crate::data::valid_segments::{ObservableForce, ValidSegments, widened};
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::Course;
+use crate::hypothesis::Hypothesis;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Share of the samples that must be left when those at which joints with dry friction rest are left out: of a simulated motion, which sticks as
@@ -241,9 +241,9 @@ mod tests {
     use arm_ident::regression::trial::Trial;
 
     use super::*;
+    use crate::data::course::tests::of_one;
     use crate::data::noise::Noise;
-    use crate::measurement_model::hypothesis::tests::plain;
-    use crate::measurement_model::prediction::tests::of_one;
+    use crate::hypothesis::tests::plain;
 
     fn with(known: Vec<Effect<f64>>) -> Hypothesis<2> {
         Hypothesis { known, ..plain() }

@@ -7,7 +7,7 @@ use arm_sim::{SimulationError, altered};
 
 use crate::GapError;
 use crate::data::passive_law::Passive;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 
 /// A data set, the input of the workflow.
 #[derive(Clone, Debug)]
@@ -289,7 +289,7 @@ impl<const N: usize> Session<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement_model::prediction::tests::resting;
+    use crate::data::course::tests::resting;
 
     #[test]
     fn the_force_of_a_led_arm_is_read_whether_or_not_torques_were_recorded_beside_it() {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use arm_core::Plane;
 use arm_ident::regression::trial::Trial;
 
-use crate::measurement_model::prediction::{Channels, Course, away_from_gaps, margin};
+use crate::data::course::{Channels, Course, away_from_gaps, margin};
 
 /// Samples kept for each period of the cutoff.
 pub(crate) const SAMPLES_PER_PERIOD: f64 = 2.5;
@@ -224,7 +224,7 @@ fn around(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement_model::prediction::tests::resting;
+    use crate::data::course::tests::resting;
 
     fn of(stretches: Vec<Vec<usize>>) -> ValidSegments {
         ValidSegments {

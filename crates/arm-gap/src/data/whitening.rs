@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use arm_core::Plane;
 use arm_numerics::statistics::autoregressive::{Predictor, Whitener};
 
+use crate::data::course::Channels;
 use crate::data::valid_segments::ObservableForce;
-use crate::measurement_model::prediction::Channels;
 
 /// Which samples there are, and the observable force at each.
 #[derive(Clone, Copy)]

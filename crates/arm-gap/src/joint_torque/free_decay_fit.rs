@@ -9,12 +9,12 @@ use arm_numerics::linalg::matrix::add_scaled;
 use arm_numerics::statistics::autoregressive::effective_samples;
 use arm_numerics::{Cholesky, Matrix};
 
+use crate::data::course::Channels;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
+use crate::hypothesis::priors;
+use crate::hypothesis::{Coordinate, Hypothesis};
 use crate::joint_torque::free_run::{CHANGE, State, slope_into};
-use crate::measurement_model::hypothesis::priors;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
-use crate::measurement_model::prediction::Channels;
 use crate::selection::fit::{Fitted, Precision};
 use crate::sensitivity::normal_equations::solve;
 

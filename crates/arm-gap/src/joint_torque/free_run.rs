@@ -7,11 +7,12 @@ use arm_core::Joints;
 use arm_numerics::{Cholesky, Matrix};
 use arm_sim::{Drive, Experiment, Interpolation, Series, SimulationError, Start, simulate};
 
+use crate::data::course::{Channels, Course};
 use crate::data::noise::dot;
 use crate::data::session::Session;
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::hypothesis::Hypothesis;
 use crate::measurement_model::joint_torques::{offsets, unbent};
-use crate::measurement_model::prediction::{Channels, Course, STEPS};
+use crate::measurement_model::prediction::STEPS;
 
 /// How long a start is fitted to, and how long a driven arm runs \[s\].
 const SPAN: f64 = 1.0;

@@ -2,9 +2,10 @@
 
 use arm_sim::SimulationError;
 
+use crate::data::course::{Channels, Course};
 use crate::data::session::{ComparisonMode, Session};
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course, in_common_band};
+use crate::hypothesis::Hypothesis;
+use crate::measurement_model::prediction::in_common_band;
 
 impl<const N: usize> Session<N> {
     /// Measured channels as a gap is measured to them: as the sensors read them where the arm is led, but for forces whose robot is not
@@ -42,7 +43,7 @@ impl<const N: usize> Session<N> {
 
 #[cfg(test)]
 mod tests {
-    use crate::measurement_model::prediction::tests::resting;
+    use crate::data::course::tests::resting;
 
     #[test]
     fn forces_are_compared_in_the_band_where_the_path_is_unresolved() {

@@ -10,11 +10,11 @@ use arm_core::effect::{Effect, Nature};
 use arm_numerics::Matrix;
 use arm_sim::SimulationError;
 
+use crate::data::course::{Channels, Course, difference, smooth};
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
-use crate::measurement_model::hypothesis::{Hypothesis, Target};
-use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
+use crate::hypothesis::{Hypothesis, Target};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::slope;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};

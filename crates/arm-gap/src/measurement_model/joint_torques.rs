@@ -5,10 +5,10 @@ use arm_core::{Joints, Pose, Reading, inverse_dynamics, joint_force};
 use arm_ident::regression::kinematics::Kinematics;
 use arm_sim::SimulationError;
 
+use crate::data::contact_readings::Sensing;
+use crate::data::course::{Channels, Course};
 use crate::data::session::Session;
-use crate::measurement_model::contact_readings::Sensing;
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course};
+use crate::hypothesis::Hypothesis;
 
 impl<const N: usize> Session<N> {
     /// Joint torques by inverse dynamics of the measured motion; where dry friction holds a joint, what was measured.
@@ -117,8 +117,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::data::course::tests::of_one;
     use crate::data::session::ComparisonMode;
-    use crate::measurement_model::prediction::tests::of_one;
 
     /// Circles of an arm that its contact moves, read by sensors with every fault that there is.
     #[test]

@@ -5,37 +5,16 @@ use arm_core::{
     Chain, Contact, Joints, Placement, Plane, Pose, Setup, inverse_dynamics, jacobian, joint_force,
     static_torque, tip,
 };
-use arm_ident::regression::trial::Trial;
 use arm_sim::{Experiment, SimulationError, Start, simulate};
 use nalgebra::{SMatrix, Vector2};
 
+use crate::data::contact_readings::Sensing;
+use crate::data::course::Course;
 use crate::data::session::Session;
-use crate::measurement_model::contact_readings::Sensing;
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::hypothesis::Hypothesis;
 use crate::measurement_model::joint_torques::offsets;
-use crate::measurement_model::prediction::Course;
-
-/// Samples at the start whose mean is the position at rest.
-const START: usize = 5;
-/// Time at the start over which forces are averaged \[s\].
-const START_TIME: f64 = 0.2;
 
 impl<const N: usize> Session<N> {
-    /// Angles \[rad\] and force on the arm \[N\] that are measured at the start of a trial.
-    pub(super) fn measured_at_start(trial: &Trial<N>) -> (Joints<f64, N>, Plane<f64>) {
-        let first = trial.valid.iter().position(|v| *v).unwrap_or(0);
-        let span = first..(first + START).min(trial.len());
-        let count = span.len() as f64;
-        let start = span.map(|i| trial.q[i]).sum::<Joints<f64, N>>() / count;
-        let resting =
-            first..(first + START.max((START_TIME * trial.rate) as usize)).min(trial.len());
-        let start_force = trial.force_on_arm.as_ref().map_or([0.0; 2], |force| {
-            let count = resting.len() as f64;
-            [0, 1].map(|a| force[resting.clone()].iter().map(|f| f[a]).sum::<f64>() / count)
-        });
-        (start, start_force)
-    }
-
     /// The angles near which a run starts: measured, as a hypothesis has them.
     ///
     /// A joint that dry friction holds where it is measured may hardly turn in what the handle leaves free, while others turn much: then its
@@ -260,9 +239,10 @@ pub(crate) fn held_at_start<const N: usize>(friction: &Joints<f64, N>) -> [bool;
 #[cfg(test)]
 mod tests {
     use arm_core::Segment;
+    use arm_ident::regression::trial::Trial;
 
     use super::*;
-    use crate::measurement_model::prediction::tests::of_one;
+    use crate::data::course::tests::of_one;
 
     /// An arm without weight from its base on.
     fn three_segments(base: Plane<f64>) -> Chain<f64, 3> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::effect::sign_in_files;
 use super::{SearchInput, placed};
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 
 /// A small imperfection that was refitted.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -3,7 +3,7 @@
 use arm_model::{Contact, Effect, Joint, Model, Refused, Robot, Segment};
 use serde::Serialize;
 
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::hypothesis::Hypothesis;
 
 /// What was fitted of a model, in the terms of the model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -5,7 +5,7 @@ use arm_model::Effect;
 use serde::Serialize;
 
 use super::{Named, SearchInput, Value, at_most, placed};
-use crate::measurement_model::hypothesis::Target;
+use crate::hypothesis::Target;
 use crate::selection::conclusion::Finding;
 use crate::selection::model_selection::{self, FittedAlternative};
 use crate::trial_specific::component::TrialSpecific;

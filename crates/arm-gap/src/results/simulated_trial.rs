@@ -5,10 +5,10 @@ use std::sync::Arc;
 use arm_ident::regression::trial::Role;
 
 use super::{SearchInput, root_mean_square};
+use crate::data::course::{Channels, Course};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course};
+use crate::hypothesis::Hypothesis;
 
 /// A model that is compared with the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

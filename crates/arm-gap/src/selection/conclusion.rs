@@ -6,7 +6,7 @@ use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::model_selection::NamedEffect;

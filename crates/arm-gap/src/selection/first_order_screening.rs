@@ -7,7 +7,7 @@ use crate::candidates::candidate::Candidate;
 use crate::candidates::library::Library;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::score_test::ScoreTest;

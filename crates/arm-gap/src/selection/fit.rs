@@ -4,9 +4,9 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
+use crate::data::course::Channels;
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
-use crate::measurement_model::prediction::Channels;
+use crate::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
 use crate::selection::score_variance::{spread, told};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
@@ -477,7 +477,7 @@ pub(crate) fn decided<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement_model::hypothesis::tests::plain;
+    use crate::hypothesis::tests::plain;
 
     /// Noise leaves a cost of one for each row; a gain of 0.2 counts there, and with 10 000 too much left one of a ten thousandth more.
     #[test]

@@ -6,7 +6,7 @@ use crate::GapError;
 use crate::candidates::refined_shapes::CREEP;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::Fitted;
 use crate::selection::search_state::Settled;
 

@@ -5,11 +5,11 @@ use arm_ident::regression::trial::Trial;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
+use crate::data::course::{Channels, difference};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
-use crate::measurement_model::hypothesis::priors;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis};
-use crate::measurement_model::prediction::{Channels, difference};
+use crate::hypothesis::priors;
+use crate::hypothesis::{Coordinate, Hypothesis};
 use crate::selection::fit::regularise;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};

@@ -8,7 +8,7 @@ use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::{Library, Twin};
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::hypothesis::Hypothesis;
+use crate::hypothesis::Hypothesis;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::score_test::{Choice, ScoreTest};

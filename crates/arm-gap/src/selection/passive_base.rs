@@ -13,7 +13,7 @@ use crate::candidates::library::{Library, Twin};
 use crate::data::passive_law::Passive;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
-use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::hypothesis::{Hypothesis, Target};
 use crate::selection::fit::{Fitted, Precision};
 use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::selection::model_selection::{FittedAlternative, NamedEffect, TIE};

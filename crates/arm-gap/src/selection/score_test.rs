@@ -7,7 +7,7 @@ use crate::GapError;
 use crate::candidates::candidate::{Candidate, price};
 use crate::candidates::library::{Library, Twin};
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, priors};
+use crate::hypothesis::{Coordinate, Hypothesis, priors};
 use crate::selection::fit::{Fitted, regularise};
 use crate::selection::score_variance::{spread, told, unlike};
 use crate::sensitivity::linearization_point::LinearizationPoint;

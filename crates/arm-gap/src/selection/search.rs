@@ -5,7 +5,7 @@ use crate::candidates::candidate::Candidate;
 use crate::candidates::library::Library;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::{Hypothesis, Target};
+use crate::hypothesis::{Hypothesis, Target};
 use crate::selection::conclusion::Finding;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;

@@ -6,9 +6,9 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
+use crate::data::course::Course;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::prediction::Course;
 use crate::selection::fit::Fitted;
 use crate::selection::lack_of_fit::lack_of_fit;
 use crate::selection::search_state::{Progress, SearchState, Settled};

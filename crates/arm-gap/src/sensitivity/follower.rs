@@ -8,8 +8,8 @@ use arm_core::{Joints, Plane};
 use arm_sim::{Change, SimulationError};
 use nalgebra::SMatrix;
 
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course};
+use crate::data::course::{Channels, Course};
+use crate::hypothesis::Hypothesis;
 use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::newton::{MissingTorque, newton, slide};

@@ -7,8 +7,8 @@ use arm_core::effect::{Effect, dry_friction, resisting_besides_dry};
 use arm_core::{Joints, Plane};
 use arm_sim::SimulationError;
 
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, smooth};
+use crate::data::course::{Channels, smooth};
+use crate::hypothesis::Hypothesis;
 use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::origin::Origin;

@@ -9,10 +9,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use arm_sim::SimulationError;
 
 use crate::GapError;
+use crate::data::course::{Channels, Course, difference, smooth};
 use crate::data::prepared_session::{PreparedSession, SimulatedRuns};
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::measurement_model::prediction::{Channels, Course, difference, smooth};
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::origin::Origin;

@@ -8,9 +8,9 @@ use arm_sim::{SimulationError, Slopes, cubic_weights};
 use nalgebra::SMatrix;
 use std::sync::{Arc, OnceLock};
 
+use crate::data::course::{Channels, Course, smooth};
 use crate::data::session::Session;
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::{Channels, Course, smooth};
+use crate::hypothesis::Hypothesis;
 use crate::sensitivity::origin::Origin;
 use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::sensitivity::sliding::Mode;

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use arm_core::effect::Motion;
 use arm_core::{Joints, Plane};
 
-use crate::measurement_model::prediction::Channels;
+use crate::data::course::Channels;
 use crate::measurement_model::start::held_at_start;
 use crate::sensitivity::plant::{Balance, Plant};
 

@@ -7,9 +7,9 @@ use arm_core::{
 };
 use arm_sim::SimulationError;
 
+use crate::data::course::Course;
 use crate::data::session::Session;
-use crate::measurement_model::hypothesis::Hypothesis;
-use crate::measurement_model::prediction::Course;
+use crate::hypothesis::Hypothesis;
 use crate::measurement_model::start::{at_rest, is_set_valued_friction};
 
 /// What moves a led arm, besides its own state.

@@ -1,6 +1,6 @@
 //! The response of the channels to a change.
 
-use crate::measurement_model::prediction::Channels;
+use crate::data::course::Channels;
 
 /// Response of the channels to one unit of a number, by group.
 #[derive(Clone, Debug)]

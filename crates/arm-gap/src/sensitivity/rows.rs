@@ -5,11 +5,11 @@ use std::sync::Arc;
 use arm_numerics::linalg::matrix::add_scaled;
 use arm_numerics::{Cholesky, Matrix};
 
+use crate::data::course::Channels;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
 use crate::data::whitening::Whitening;
-use crate::measurement_model::prediction::Channels;
 use crate::sensitivity::normal_equations::Cluster;
 use crate::sensitivity::response::Response;
 
@@ -84,9 +84,7 @@ impl Rows {
         for (class, whitened) in classes.iter_mut().zip(whitened) {
             (class.columns, class.products) = whitened;
         }
-        let sd = |c: crate::measurement_model::hypothesis::Coordinate| {
-            c.prior.map_or(f64::INFINITY, |(_, sd)| sd)
-        };
+        let sd = |c: crate::hypothesis::Coordinate| c.prior.map_or(f64::INFINITY, |(_, sd)| sd);
         Self {
             classes,
             own: prepared.session.by_trial().into_iter().map(sd).collect(),

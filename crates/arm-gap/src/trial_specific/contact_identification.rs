@@ -8,12 +8,12 @@ use std::sync::Arc;
 use arm_core::effect::Effect;
 use arm_numerics::{Cholesky, Matrix};
 
+use crate::data::course::{Channels, away_from_gaps, difference, margin, smooth};
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
-use crate::measurement_model::hypothesis::departure;
-use crate::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::measurement_model::prediction::{Channels, away_from_gaps, difference, margin, smooth};
+use crate::hypothesis::departure;
+use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::selection::fit::{Equations, Step};
 use crate::sensitivity::normal_equations::Cluster;
 use crate::trial_specific::component::shapes_of;

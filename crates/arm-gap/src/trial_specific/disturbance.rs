@@ -3,10 +3,10 @@
 use arm_core::effect::{Effect, Nature};
 
 use crate::candidates::candidate::price;
+use crate::data::course::Channels;
 use crate::data::noise::{dot, orthogonal, project_off};
 use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
-use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{TrialSpecific, timing_of};

@@ -2,9 +2,9 @@
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
 
+use crate::data::course::{Channels, Course, smooth};
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::prediction::{Channels, Course, smooth};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::trial_specific::component::timing_of;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use arm_core::effect::Nature;
 
 use crate::GapError;
+use crate::data::course::{Course, smooth};
 use crate::data::prepared_session::PreparedSession;
-use crate::measurement_model::prediction::{Course, smooth};
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;

@@ -2,7 +2,7 @@
 
 use arm_numerics::Matrix;
 
-use crate::measurement_model::prediction::Channels;
+use crate::data::course::Channels;
 use arm_numerics::signal::spectrum::coefficient;
 
 /// A frequency in the spectra of residuals.

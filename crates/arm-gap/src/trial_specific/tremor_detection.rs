@@ -5,10 +5,10 @@ use arm_core::{Contact, Joints, Pose, jacobian};
 use arm_numerics::Cholesky;
 
 use crate::GapError;
+use crate::data::course::Channels;
 use crate::data::noise::dot;
 use crate::data::prepared_session::PreparedSession;
 use crate::data::repeats::same_rate;
-use crate::measurement_model::prediction::Channels;
 use crate::selection::model_selection::TIE;
 use crate::sensitivity::linear_response::Change;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};

@@ -7,7 +7,7 @@ use arm_gap::data::noise::{Noise, Thinned};
 use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::repeats::groups;
 use arm_gap::data::session::{ComparisonMode, Session};
-use arm_gap::measurement_model::hypothesis::{Coordinate, Target};
+use arm_gap::hypothesis::{Coordinate, Target};
 use arm_ident::regression::trial::{Role, Tolerance};
 use std::sync::Arc;
 

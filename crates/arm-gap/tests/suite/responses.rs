@@ -2,7 +2,7 @@
 
 use arm_core::effect::{Effect, Kind};
 use arm_gap::data::prepared_session::PreparedSession;
-use arm_gap::measurement_model::hypothesis::{Coordinate, Hypothesis, Target};
+use arm_gap::hypothesis::{Coordinate, Hypothesis, Target};
 
 use crate::sessions::session;
 

@@ -83,7 +83,7 @@ fn a_run_ends_at_a_gap_and_short_pieces_are_not_simulated() {
 
 #[test]
 fn a_free_arm_tells_no_mass_by_itself_and_a_led_one_has_no_free_run() {
-    use arm_gap::measurement_model::hypothesis::Target;
+    use arm_gap::hypothesis::Target;
     let mut session = swinging(1.0);
     let targets: Vec<_> = session.nuisances().iter().map(|c| c.target).collect();
     assert!(!targets.contains(&Target::Segment(0, 0)) && targets.contains(&Target::Segment(1, 0)));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use arm_gap::measurement_model::prediction::Channels;
+use arm_gap::data::course::Channels;
 use arm_gap::results as core;
 use arm_gap::results::Version;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};

@@ -13,7 +13,7 @@ use crate::data::session::{ComparisonMode, Session};
 
 /// Angles, and force and moment on the arm, as they were read.
 #[derive(Clone, Debug)]
-pub(super) struct ContactReadings<const N: usize> {
+pub(crate) struct ContactReadings<const N: usize> {
     q: Vec<Joints<f64, N>>,
     /// Force \[N\] and moment \[N m\]: `Fy`, `Fz`, `Mx`.
     force: Series<3>,
@@ -24,7 +24,7 @@ impl<const N: usize> Session<N> {
     ///
     /// # Errors
     /// [`GapError`] for forces that a spline refuses.
-    pub(super) fn contact_readings(
+    pub(crate) fn contact_readings(
         &self,
         trial: usize,
         times: &[f64],
@@ -55,7 +55,7 @@ impl<const N: usize> ContactReadings<N> {
     ///
     /// * `nominal`, `chain`, `setup` - the arm with which the channels were computed; the arm and the rig as a hypothesis has them
     /// * `misread` - what the angle sensors add \[rad\]
-    pub(super) fn missing_force(
+    pub(crate) fn missing_force(
         &self,
         (nominal, chain, setup, sensing): (
             &Chain<f64, N>,
@@ -95,14 +95,14 @@ impl<const N: usize> ContactReadings<N> {
 }
 
 /// What the sensors of the contact force do to it: they are affine in force and moment.
-pub(super) struct Sensing {
+pub(crate) struct Sensing {
     effects: Vec<Effect<f64>>,
     gains: Matrix3<f64>,
     inverse: Matrix3<f64>,
 }
 
 impl Sensing {
-    pub(super) fn of(effects: &[Effect<f64>]) -> Self {
+    pub(crate) fn of(effects: &[Effect<f64>]) -> Self {
         let senses =
             |e: &&Effect<f64>| matches!(e.kind.info().place, Place::ForceSensor | Place::Sensors);
         let mut sensing = Self {
@@ -118,7 +118,7 @@ impl Sensing {
         sensing
     }
 
-    pub(super) fn read(&self, time: f64, true_values: Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn read(&self, time: f64, true_values: Vector3<f64>) -> Vector3<f64> {
         let [y, z, moment] = true_values.into();
         let mut reading = Reading::<f64, 0> {
             time,
@@ -133,7 +133,7 @@ impl Sensing {
     }
 
     /// The force \[N\] and the moment \[N m\] that are read as these.
-    pub(super) fn undone(&self, time: f64, read: [f64; 3]) -> (Plane<f64>, f64) {
+    pub(crate) fn undone(&self, time: f64, read: [f64; 3]) -> (Plane<f64>, f64) {
         let left = Vector3::from(read) - self.read(time, Vector3::zeros());
         let [y, z, moment] = (self.inverse * left).into();
         ([y, z], moment)
