@@ -4,7 +4,7 @@ use arm_core::effect::{Effect, Kind};
 use arm_core::{
     Joints, Load, Pose, Scalar, forward_dynamics, inverse_dynamics, sample_arms as arms,
 };
-use arm_gap::data::prepared_session::PreparedSession;
+use arm_gap::prepared_session::PreparedSession;
 use arm_sim::{Experiment, Integrator, sample_experiments, simulate};
 use std::hint::black_box;
 

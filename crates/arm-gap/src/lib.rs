@@ -1,12 +1,22 @@
 #![doc = include_str!("../README.md")]
+//!
+//! ## Order of the modules
+//! Each module uses those before it, and none behind it:
+//!
+//! `error` ← `hypothesis` ← `data` ← `measurement_model` ← `linearization` ← `prepared_session` ← `sensitivity` ← `candidates` ←
+//! `fitting` ← `preparation` ← `selection` ← `trial_specific` ← `search` ← `results`
 
 pub mod candidates;
 pub mod data;
 mod error;
+pub mod fitting;
 pub mod hypothesis;
-pub mod joint_torque;
+pub mod linearization;
 pub mod measurement_model;
+pub mod preparation;
+pub mod prepared_session;
 pub mod results;
+pub mod search;
 pub mod selection;
 pub mod sensitivity;
 pub mod trial_specific;

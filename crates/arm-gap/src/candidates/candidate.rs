@@ -5,10 +5,10 @@ use arm_core::effect::{Effect, Kind, Nature, Part, Place};
 use crate::candidates::refined_shapes::{held, is_plainer, refined};
 use crate::candidates::torque_step::{motions, torque_step};
 use crate::data::passive_law::Free;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::sensitivity::linear_response::Change;
+use crate::linearization::linear_response::Change;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Gain needed by one effect beyond its degrees of freedom, in units of twice the log-likelihood: about one false name in a thousand

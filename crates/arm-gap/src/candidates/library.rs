@@ -10,10 +10,10 @@ use crate::GapError;
 use crate::candidates::candidate::{Candidate, expected};
 use crate::candidates::refined_shapes::refined;
 use crate::candidates::torque_step::{Movement, motions, torque_step};
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, Session};
+use crate::linearization::linear_response::Response;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
-use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::{Columns, Rows};
 
 /// All candidates of a session with their responses; those that the movements do not excite are left out.

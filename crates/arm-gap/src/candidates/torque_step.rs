@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, MAX_STATES, Motion, advance_states, resisting_torque};
 use arm_core::{Joints, Pose, inverse_dynamics, joint_force};
 
-use crate::data::prepared_session::PreparedSession;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Share of a joint's torque that an effect has in the change with which its response is taken.

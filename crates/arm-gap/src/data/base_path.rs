@@ -11,7 +11,7 @@ impl<const N: usize> Session<N> {
     ///
     /// # Errors
     /// [`GapError`] for a path that the filter or a spline refuses.
-    pub(crate) fn base_path(
+    pub(super) fn base_path(
         &self,
         trial: usize,
         times: &[f64],

@@ -30,7 +30,7 @@ const NOISE_ALONE: f64 = 2.0;
 ///
 /// # Errors
 /// [`GapError::Numerics`] for a trial too short for the filters.
-pub(crate) fn handle_path(
+pub(super) fn handle_path(
     points: &[Plane<f64>],
     (noise, forces, stiffness): (Plane<f64>, &[Vec<f64>], Plane<f64>),
     band: f64,
@@ -66,7 +66,7 @@ pub(crate) fn handle_path(
 ///
 /// # Errors
 /// [`GapError::Numerics`] for a trial too short for the filters.
-pub(crate) fn path_noise<'a>(
+pub(super) fn path_noise<'a>(
     paths: impl Iterator<Item = (&'a [Plane<f64>], f64)>,
 ) -> Result<Plane<f64>, GapError> {
     let mut least = [f64::INFINITY; 2];

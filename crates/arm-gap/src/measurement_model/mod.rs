@@ -1,7 +1,7 @@
-//! Predicted readings of the channels under a hypothesis.
+//! Predicted readings of the channels under a hypothesis, by simulation or by inverse dynamics.
 
+pub mod free_run;
 mod gap_channels;
-pub mod in_trial;
 pub mod joint_torques;
 pub mod prediction;
 pub(crate) mod start;

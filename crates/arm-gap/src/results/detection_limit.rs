@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::{Named, placed};
 use crate::candidates::candidate::Candidate;
-use crate::selection::first_order_screening;
+use crate::search::first_order_screening;
 use crate::selection::search_state::{self, Ruled};
 
 /// An effect that was tested and not named: the smallest size that these data would have shown, and what it would explain.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{Named, SearchInput, Value, at_most, placed};
 use crate::hypothesis::Target;
-use crate::selection::conclusion::Finding;
+use crate::search::conclusion::Finding;
 use crate::selection::model_selection::{self, FittedAlternative};
 use crate::trial_specific::component::TrialSpecific;
 

@@ -13,11 +13,11 @@ use super::{
     Absorbed, ChannelGap, Evidence, Fitted, Limit, Missing, Named, Open, Place, SearchInput,
     SearchStep, SimulatedTrial, Suspect, Verdict, Version, at_least, at_most, placed,
 };
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
-use crate::selection::conclusion::Finding;
-use crate::selection::first_order_screening::Look;
-use crate::selection::lack_of_fit::LackOfFit;
+use crate::fitting::lack_of_fit::LackOfFit;
+use crate::prepared_session::PreparedSession;
+use crate::search::conclusion::Finding;
+use crate::search::first_order_screening::Look;
 
 /// Lack of fit of a model on the fit trials; not a number without repeats.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -6,9 +6,9 @@ use arm_ident::regression::trial::Role;
 
 use super::{SearchInput, root_mean_square};
 use crate::data::course::{Channels, Course};
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
 use crate::hypothesis::Hypothesis;
+use crate::prepared_session::PreparedSession;
 
 /// A model that is compared with the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,10 +4,10 @@ use arm_core::effect::Kind;
 
 use crate::GapError;
 use crate::candidates::refined_shapes::CREEP;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
+use crate::fitting::fit::Fitted;
 use crate::hypothesis::{Hypothesis, Target};
-use crate::selection::fit::Fitted;
+use crate::prepared_session::PreparedSession;
 use crate::selection::search_state::Settled;
 
 /// Speeds below which friction may creep \[rad/s\]; with zero it sticks.

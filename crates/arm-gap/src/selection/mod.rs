@@ -1,17 +1,10 @@
-//! Which effects are missing: first-order score tests, search by fitting, model selection.
+//! Selection of effects: score tests, comparison with alternatives, the passive base, the test on test trials.
 
-pub mod conclusion;
-pub mod first_order_screening;
-pub mod fit;
 mod friction_at_rest;
 pub mod held_out;
-pub mod lack_of_fit;
 pub mod model_discrimination;
 pub mod model_selection;
 pub mod passive_base;
 mod passive_base_evidence;
 pub mod score_test;
-pub mod score_variance;
-pub mod search;
 pub mod search_state;
-pub mod set_apart;

@@ -6,14 +6,14 @@ use arm_ident::regression::trial::Trial;
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::course::{Channels, difference};
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
+use crate::fitting::fit::regularise;
 use crate::hypothesis::priors;
 use crate::hypothesis::{Coordinate, Hypothesis};
-use crate::selection::fit::regularise;
+use crate::linearization::linear_response::Response;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
-use crate::sensitivity::response::Response;
 
 /// A named effect, and others that would do instead.
 pub struct Contest<'a, const N: usize> {

@@ -7,10 +7,10 @@ use arm_core::effect::{Effect, Place};
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::{Library, Twin};
-use crate::data::prepared_session::PreparedSession;
+use crate::fitting::fit::Fitted;
+use crate::fitting::lack_of_fit::lack_of_fit;
 use crate::hypothesis::Hypothesis;
-use crate::selection::fit::Fitted;
-use crate::selection::lack_of_fit::lack_of_fit;
+use crate::prepared_session::PreparedSession;
 use crate::selection::score_test::{Choice, ScoreTest};
 use crate::selection::search_state::{Progress, SearchState, Settled};
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -455,6 +455,38 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn price_of_shapes(&self, asked: &[Candidate]) -> f64 {
         let shapes: f64 = asked.iter().map(Candidate::shapes).sum();
         shapes * libm::log(self.rows_of_references() as f64)
+    }
+
+    /// A hypothesis with further effects, fitted; `None` where it cannot be followed.
+    ///
+    /// The first-order coefficients are halved until they lower the cost: effects that are strong are not linear.
+    pub(crate) fn attempt(
+        &self,
+        current: &Fitted<N>,
+        (asked, coefficients): (&[Candidate], &[Vec<f64>]),
+        point: &LinearizationPoint<N>,
+    ) -> Option<Fitted<N>> {
+        /// Shares of the first-order coefficients that are tried: the response to a strong effect is smaller than to first order.
+        const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+        let mut all = current.asked.clone();
+        all.extend_from_slice(asked);
+        let mut best: Option<Fitted<N>> = None;
+        for share in SHARES {
+            let mut hypothesis = current.hypothesis.clone();
+            for (candidate, own) in std::iter::zip(asked, coefficients) {
+                let own: Vec<f64> = own.iter().map(|b| share * b).collect();
+                hypothesis.named.push(candidate.found(&own));
+            }
+            if let Ok(fitted) = self.fit(point, hypothesis.handed_over(), all.clone()) {
+                if fitted.cost < current.cost {
+                    return Some(fitted);
+                }
+                if best.as_ref().is_none_or(|b| fitted.cost < b.cost) {
+                    best = Some(fitted);
+                }
+            }
+        }
+        best
     }
 }
 

@@ -3,19 +3,18 @@
 //! The closed chain is simulated with the base that was identified from measured motion. Its parameters stay free with every candidate,
 //! and its laws are selected last.
 
-use arm_core::effect::{Effect, Kind, Place};
-use arm_ident::regression::unknown::spring;
+use arm_core::effect::{Effect, Place};
 use arm_numerics::statistics::distributions::chi_square_tail;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::{Library, Twin};
 use crate::data::passive_law::Passive;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::Session;
+use crate::fitting::fit::{Fitted, Precision};
+use crate::fitting::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::hypothesis::{Hypothesis, Target};
-use crate::selection::fit::{Fitted, Precision};
-use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
+use crate::prepared_session::PreparedSession;
 use crate::selection::model_selection::{FittedAlternative, NamedEffect, TIE};
 use crate::selection::passive_base_evidence::{ODDS, STAYS, Term, crossed_joints, least_of};
 use crate::selection::search_state::Settled;
@@ -245,14 +244,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.dropped.clone_from(&before);
         }
         Ok(None)
-    }
-
-    /// Whether a law of the base acts that is not dropped, or stands for it: a spring with its rest angle stands for a constant moment.
-    pub(crate) fn has_in_base(&self, kind: Kind, joint: usize) -> bool {
-        let is_constant = Effect::<f64>::new(kind, joint).is_constant();
-        let stands = |e: &Effect<f64>| e.kind == kind || is_constant && spring(e).is_some();
-        let mut kept = std::iter::zip(&self.dropped, &self.session.base).filter(|(d, _)| !**d);
-        kept.any(|(_, law)| law.effect.index == joint && stands(&law.effect))
     }
 
     /// Chooses the samples and reads the noise anew from where the next calibration starts.
@@ -517,5 +508,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             (fitted, lack)
         }))
+    }
+
+    /// The model as given, with everything refitted that was never exact.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::settle`].
+    pub fn calibrate(&self) -> Result<Settled<'a, N>, GapError> {
+        self.settle(self.given(), Vec::new())
     }
 }

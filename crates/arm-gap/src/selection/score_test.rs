@@ -6,10 +6,10 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::GapError;
 use crate::candidates::candidate::{Candidate, price};
 use crate::candidates::library::{Library, Twin};
-use crate::data::prepared_session::PreparedSession;
+use crate::fitting::fit::{Fitted, regularise};
+use crate::fitting::score_variance::{spread, told, unlike};
 use crate::hypothesis::{Coordinate, Hypothesis, priors};
-use crate::selection::fit::{Fitted, regularise};
-use crate::selection::score_variance::{spread, told, unlike};
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Normal, solve};
 

@@ -4,8 +4,8 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::selection::fit::Fitted;
-use crate::selection::lack_of_fit::LackOfFit;
+use crate::fitting::fit::Fitted;
+use crate::fitting::lack_of_fit::LackOfFit;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// One round of the search.

@@ -10,13 +10,12 @@ use arm_sim::SimulationError;
 
 use crate::GapError;
 use crate::data::course::{Channels, Course, difference, smooth};
-use crate::data::prepared_session::{PreparedSession, SimulatedRuns};
 use crate::data::session::ComparisonMode;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::sensitivity::linear_response::Change;
-use crate::sensitivity::linearized_run::{ASTRAY, Linear};
-use crate::sensitivity::origin::Origin;
-use crate::sensitivity::response::Response;
+use crate::linearization::linear_response::{Change, Response};
+use crate::linearization::linearized_run::{ASTRAY, Linear};
+use crate::linearization::origin::Origin;
+use crate::prepared_session::{PreparedSession, SimulatedRuns};
 use crate::sensitivity::rows::Rows;
 
 /// A hypothesis that was simulated.

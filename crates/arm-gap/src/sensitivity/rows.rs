@@ -7,11 +7,11 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::course::Channels;
 use crate::data::noise::dot;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
 use crate::data::whitening::Whitening;
+use crate::linearization::linear_response::Response;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::normal_equations::Cluster;
-use crate::sensitivity::response::Response;
 
 /// Parts of a trial that are predicted from each other where no movement is repeated.
 pub const PARTS: usize = 5;

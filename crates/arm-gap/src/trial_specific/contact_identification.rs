@@ -10,11 +10,11 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::course::{Channels, away_from_gaps, difference, margin, smooth};
 use crate::data::noise::dot;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
+use crate::fitting::fit::{Equations, Step};
 use crate::hypothesis::departure;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::selection::fit::{Equations, Step};
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::normal_equations::Cluster;
 use crate::trial_specific::component::shapes_of;
 

@@ -4,8 +4,8 @@ use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
 
 use crate::data::course::{Channels, Course, smooth};
 use crate::data::noise::dot;
-use crate::data::prepared_session::PreparedSession;
-use crate::sensitivity::linear_response::Change;
+use crate::linearization::linear_response::Change;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::{LinearizationPoint, slope};
 use crate::trial_specific::component::timing_of;
 

@@ -4,8 +4,8 @@
 use core::f64::consts::FRAC_PI_2;
 
 use crate::candidates::library::Library;
-use crate::data::prepared_session::PreparedSession;
-use crate::selection::fit::Fitted;
+use crate::fitting::fit::Fitted;
+use crate::prepared_session::PreparedSession;
 use crate::selection::score_test::ScoreTest;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::{SLOW, shapes_of};

@@ -1,10 +1,11 @@
-//! What differs between trials, or swings too fast for the common band: rhythms, ripple, disturbances, the contact.
+//! Effects of single trials, and rhythms: tremor, ripple, disturbances, the place of the handle, the contact.
 
 pub mod component;
 pub(crate) mod contact_identification;
 pub mod disturbance;
 mod disturbance_shape;
 pub mod in_phase;
+pub mod in_trial;
 mod setting_apart;
 mod spectral_line;
 pub mod tremor_detection;

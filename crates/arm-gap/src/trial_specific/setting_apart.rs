@@ -6,8 +6,8 @@ use arm_core::effect::Nature;
 
 use crate::GapError;
 use crate::data::course::{Course, smooth};
-use crate::data::prepared_session::PreparedSession;
-use crate::sensitivity::linear_response::Change;
+use crate::linearization::linear_response::Change;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 use crate::trial_specific::tremor_detection::{UNIT, common_swing, small};

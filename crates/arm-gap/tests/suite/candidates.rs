@@ -3,7 +3,7 @@
 use arm_core::effect::{Effect, KINDS, Kind, Place};
 use arm_gap::candidates::candidate::{Candidate, THRESHOLD, price};
 use arm_gap::candidates::library::Library;
-use arm_gap::data::prepared_session::PreparedSession;
+use arm_gap::prepared_session::PreparedSession;
 
 use crate::sessions::session;
 

@@ -4,10 +4,10 @@ use arm_core::Joints;
 use arm_core::effect::{Effect, Kind};
 use arm_gap::GapError;
 use arm_gap::data::noise::{Noise, Thinned};
-use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::repeats::groups;
 use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::hypothesis::{Coordinate, Target};
+use arm_gap::prepared_session::PreparedSession;
 use arm_ident::regression::trial::{Role, Tolerance};
 use std::sync::Arc;
 

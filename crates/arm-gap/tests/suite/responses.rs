@@ -1,8 +1,8 @@
 //! The linearised responses are those of the simulation.
 
 use arm_core::effect::{Effect, Kind};
-use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::hypothesis::{Coordinate, Hypothesis, Target};
+use arm_gap::prepared_session::PreparedSession;
 
 use crate::sessions::session;
 

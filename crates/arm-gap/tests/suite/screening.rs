@@ -1,7 +1,7 @@
 //! The first-order screening, and how well new movements would distinguish explanations.
 
 use arm_core::effect::{Effect, Kind};
-use arm_gap::data::prepared_session::PreparedSession;
+use arm_gap::prepared_session::PreparedSession;
 use arm_gap::selection::model_discrimination::Contest;
 
 use crate::sessions::session;
@@ -18,7 +18,7 @@ fn a_first_look_suspects_the_hidden_spring_most_and_names_nothing() {
     let look = prepared.look(&|_, _| Ok(())).expect("a look");
     assert!(look.calibrated.hypothesis.named.is_empty());
     assert!(look.lack.z > 6.0, "{:?}", look.lack);
-    let worth = |s: &arm_gap::selection::first_order_screening::ScreenedCandidate| s.gain - s.price;
+    let worth = |s: &arm_gap::search::first_order_screening::ScreenedCandidate| s.gain - s.price;
     assert!(look.suspects.is_sorted_by(|a, b| worth(a) >= worth(b)));
     let own = look
         .suspects

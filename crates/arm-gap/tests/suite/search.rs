@@ -1,8 +1,8 @@
 //! A hidden effect is found in simulated data, and nothing else is.
 
 use arm_core::effect::{Effect, Kind};
-use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::session::Session;
+use arm_gap::prepared_session::PreparedSession;
 
 use crate::sessions::session;
 

@@ -98,7 +98,7 @@ fn a_free_arm_tells_no_mass_by_itself_and_a_led_one_has_no_free_run() {
 /// A viscosity that is known to 5 % is found by the amplitude of simulated runs of 2 s, from 15 % too much.
 #[test]
 fn a_free_swing_is_fitted_by_its_simulated_amplitude() {
-    use arm_gap::data::prepared_session::PreparedSession;
+    use arm_gap::prepared_session::PreparedSession;
     let mut session = swinging(6.0);
     for effect in &mut session.effects {
         effect.parameters[0] *= 1.15;

@@ -1,8 +1,8 @@
 //! What is not the same in every trial: a handle or a sensor that slips, the robot's ripple.
 
 use arm_core::effect::{Effect, Kind, Nature};
-use arm_gap::data::prepared_session::PreparedSession;
 use arm_gap::data::session::Session;
+use arm_gap::prepared_session::PreparedSession;
 use arm_gap::trial_specific::component::TrialSpecific;
 use arm_gap::trial_specific::tremor_detection::Line;
 use arm_ident::regression::trial::Role;

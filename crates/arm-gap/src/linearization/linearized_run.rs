@@ -11,9 +11,9 @@ use std::sync::{Arc, OnceLock};
 use crate::data::course::{Channels, Course, smooth};
 use crate::data::session::Session;
 use crate::hypothesis::Hypothesis;
-use crate::sensitivity::origin::Origin;
-use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
-use crate::sensitivity::sliding::Mode;
+use crate::linearization::origin::Origin;
+use crate::linearization::plant::{Balance, Hand, Plant, State, balance, hands};
+use crate::linearization::sliding::Mode;
 
 /// The instants at which a run is recorded and solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ pub const ASTRAY: SimulationError = SimulationError::Setting {
 /// One run with the linear system along it.
 pub struct Linear<'a, const N: usize> {
     pub(super) session: &'a Session<N>,
-    pub(super) course: Arc<Course<N>>,
+    pub(crate) course: Arc<Course<N>>,
     pub(super) grid: Grid,
     /// Length of a step of the solution \[s\].
     pub(super) step: f64,

@@ -2,8 +2,8 @@
 
 use crate::data::course::Channels;
 use crate::data::noise::{Thinned, orthogonal, project_off};
-use crate::data::prepared_session::PreparedSession;
 use crate::data::valid_segments::ValidSegments;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Mean square of a deviation, in medians of those of all trials, beyond which it is not noise: a sensor

@@ -10,11 +10,11 @@ use nalgebra::SMatrix;
 
 use crate::data::course::{Channels, Course};
 use crate::hypothesis::Hypothesis;
+use crate::linearization::linearized_run::{ASTRAY, Linear};
+use crate::linearization::newton::{MissingTorque, newton, slide};
+use crate::linearization::plant::{Balance, Hand, Plant, State, balance, hands};
+use crate::linearization::sliding::Mode;
 use crate::measurement_model::start::held_at_start;
-use crate::sensitivity::linearized_run::{ASTRAY, Linear};
-use crate::sensitivity::newton::{MissingTorque, newton, slide};
-use crate::sensitivity::plant::{Balance, Hand, Plant, State, balance, hands};
-use crate::sensitivity::sliding::Mode;
 
 impl<const N: usize> Linear<'_, N> {
     /// What the sensors would read under another hypothesis, which need not be near, on a trial of the same movement;

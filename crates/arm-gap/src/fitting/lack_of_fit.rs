@@ -1,8 +1,8 @@
 //! What a fitted hypothesis leaves: more than repeats differ among themselves?
 
 use crate::data::noise::{orthogonal, project_off};
-use crate::data::prepared_session::PreparedSession;
-use crate::selection::fit::Fitted;
+use crate::fitting::fit::Fitted;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Rows whose squares are summed to estimate the scatter of such sums: about a second.

@@ -3,17 +3,16 @@
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::Library;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
+use crate::fitting::fit::Fitted;
+use crate::fitting::lack_of_fit::lack_of_fit;
 use crate::hypothesis::{Hypothesis, Target};
-use crate::selection::conclusion::Finding;
-use crate::selection::fit::Fitted;
-use crate::selection::lack_of_fit::lack_of_fit;
+use crate::prepared_session::PreparedSession;
+use crate::search::conclusion::Finding;
+use crate::search::set_apart::SetApart;
 use crate::selection::model_selection::{NamedEffect, mimicked_by_any};
 use crate::selection::score_test::{Choice, ScoreTest};
 use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
-use crate::selection::set_apart::SetApart;
-use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Most effects that are named.
 const MOST: usize = 6;
@@ -301,14 +300,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// The model as given, with everything refitted that was never exact.
-    ///
-    /// # Errors
-    /// As [`PreparedSession::settle`].
-    pub fn calibrate(&self) -> Result<Settled<'a, N>, GapError> {
-        self.settle(self.given(), Vec::new())
-    }
-
     /// The same after the data have changed, with the noise read anew.
     pub(crate) fn calibrate_anew(&mut self) -> Result<Settled<'a, N>, GapError> {
         let given = self.linearize(&self.given())?;
@@ -426,38 +417,6 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 converged.worthy.push((simple, fitted));
             }
         }
-    }
-
-    /// A hypothesis with further effects, fitted; `None` where it cannot be followed.
-    ///
-    /// The first-order coefficients are halved until they lower the cost: effects that are strong are not linear.
-    pub(crate) fn attempt(
-        &self,
-        current: &Fitted<N>,
-        (asked, coefficients): (&[Candidate], &[Vec<f64>]),
-        point: &LinearizationPoint<N>,
-    ) -> Option<Fitted<N>> {
-        /// Shares of the first-order coefficients that are tried: the response to a strong effect is smaller than to first order.
-        const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
-        let mut all = current.asked.clone();
-        all.extend_from_slice(asked);
-        let mut best: Option<Fitted<N>> = None;
-        for share in SHARES {
-            let mut hypothesis = current.hypothesis.clone();
-            for (candidate, own) in std::iter::zip(asked, coefficients) {
-                let own: Vec<f64> = own.iter().map(|b| share * b).collect();
-                hypothesis.named.push(candidate.found(&own));
-            }
-            if let Ok(fitted) = self.fit(point, hypothesis.handed_over(), all.clone()) {
-                if fitted.cost < current.cost {
-                    return Some(fitted);
-                }
-                if best.as_ref().is_none_or(|b| fitted.cost < b.cost) {
-                    best = Some(fitted);
-                }
-            }
-        }
-        best
     }
 
     fn ruled(&self, library: &Library, score_test: &ScoreTest) -> Vec<Ruled> {

@@ -3,8 +3,8 @@
 use arm_core::Joints;
 use nalgebra::SMatrix;
 
-use crate::sensitivity::plant::Balance;
-use crate::sensitivity::sliding::{LinearStep, Mode};
+use crate::linearization::plant::Balance;
+use crate::linearization::sliding::{LinearStep, Mode};
 
 /// The unknown at which nothing is missing, or as little as can be.
 pub(super) struct Solved<const N: usize> {

@@ -8,10 +8,10 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::GapError;
 use crate::data::course::Channels;
 use crate::data::noise::{Noise, Thinned, dot};
-use crate::data::prepared_session::PreparedSession;
-use crate::selection::fit::{Fitted, decided};
+use crate::fitting::fit::{Fitted, decided};
+use crate::linearization::linear_response::Response;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
-use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::Columns;
 
 impl<const N: usize> PreparedSession<'_, N> {

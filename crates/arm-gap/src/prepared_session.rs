@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
+use arm_core::effect::{Effect, Kind};
+use arm_ident::regression::unknown::spring;
 use arm_ident::threads::parallel;
 
 use crate::GapError;
@@ -11,8 +13,8 @@ use crate::data::repeats::groups;
 use crate::data::session::Session;
 use crate::data::valid_segments::{ObservableForce, ValidSegments};
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
-use crate::sensitivity::linearized_run::Linear;
-use crate::sensitivity::response::Response;
+use crate::linearization::linear_response::Response;
+use crate::linearization::linearized_run::Linear;
 
 /// How long a disturbance acts before and after, the low-pass and the error of its timing included \[s\].
 const AROUND: (f64, f64) = (0.5, 0.5);
@@ -75,24 +77,6 @@ pub(crate) struct SimulatedRuns<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// Makes a session ready; the noise is read off the repeats of the fit trials against the model as given.
-    ///
-    /// # Errors
-    /// [`GapError`] for insufficient data, or a model that cannot be simulated.
-    pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
-        let noise = Noise::unknown(session.channels())?;
-        let mut prepared = Self::with_noise(session, noise, threads)?;
-        let mut given = prepared.linearize(&session.starting())?;
-        let all = prepared.fitted.clone();
-        prepared.leave_out_rest(&given);
-        if prepared.fitted != all {
-            // A trial in which nothing is left to compare has no place among the residuals either.
-            given = prepared.linearize(&session.starting())?;
-        }
-        prepared.measure_noise(&given)?;
-        Ok(prepared)
-    }
-
     /// Makes a session ready whose noise is known from another one.
     ///
     /// # Errors
@@ -233,5 +217,18 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Results of jobs in their order, whatever the number of threads.
     pub fn parallel<R: Send>(&self, jobs: usize, one: impl Fn(usize) -> R + Sync) -> Vec<R> {
         parallel(self.threads, jobs, one)
+    }
+
+    /// Whether a law of the base acts that is not dropped, or stands for it: a spring with its rest angle stands for a constant moment.
+    pub(crate) fn has_in_base(&self, kind: Kind, joint: usize) -> bool {
+        let is_constant = Effect::<f64>::new(kind, joint).is_constant();
+        let stands = |e: &Effect<f64>| e.kind == kind || is_constant && spring(e).is_some();
+        let mut kept = std::iter::zip(&self.dropped, &self.session.base).filter(|(d, _)| !**d);
+        kept.any(|(_, law)| law.effect.index == joint && stands(&law.effect))
+    }
+
+    /// Whether samples are left out because a joint rests there.
+    pub(crate) fn leaves_out_rest(&self) -> bool {
+        !self.resting.is_empty()
     }
 }

@@ -5,11 +5,11 @@ use arm_core::effect::Effect;
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::Library;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
+use crate::fitting::fit::Fitted;
+use crate::fitting::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::hypothesis::Hypothesis;
-use crate::selection::fit::Fitted;
-use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
+use crate::prepared_session::PreparedSession;
 use crate::selection::score_test::ScoreTest;
 use crate::selection::search_state::Progress;
 use crate::trial_specific::tremor_detection::Line;
@@ -19,7 +19,7 @@ use crate::trial_specific::tremor_detection::Line;
 pub struct Look<const N: usize> {
     /// The model after refitting what was never exact.
     pub calibrated: Fitted<N>,
-    /// The same as it is in each trial; see [`crate::measurement_model::in_trial`].
+    /// The same as it is in each trial; see [`crate::trial_specific::in_trial`].
     pub in_trials: Vec<Hypothesis<N>>,
     /// Its lack of fit.
     pub lack: LackOfFit,

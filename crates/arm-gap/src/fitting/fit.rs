@@ -5,12 +5,12 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::course::Channels;
-use crate::data::prepared_session::PreparedSession;
+use crate::fitting::score_variance::{spread, told};
 use crate::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
-use crate::selection::score_variance::{spread, told};
+use crate::linearization::linear_response::Response;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
-use crate::sensitivity::response::Response;
 use crate::sensitivity::rows::Columns;
 
 /// Most steps of a fit.

@@ -4,15 +4,15 @@ use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::ComparisonMode;
+use crate::fitting::fit::{Fitted, Precision};
+use crate::fitting::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::hypothesis::{Hypothesis, Target};
-use crate::selection::fit::{Fitted, Precision};
-use crate::selection::lack_of_fit::{LackOfFit, lack_of_fit};
+use crate::prepared_session::PreparedSession;
+use crate::search::set_apart::SetApart;
 use crate::selection::model_selection::NamedEffect;
 use crate::selection::passive_base::BaseLaw;
 use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
-use crate::selection::set_apart::SetApart;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 
@@ -27,7 +27,7 @@ pub struct Finding<const N: usize> {
     pub named: Vec<NamedEffect>,
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
-    /// The calibrated and the amended model as they are in each trial; see [`crate::measurement_model::in_trial`].
+    /// The calibrated and the amended model as they are in each trial; see [`crate::trial_specific::in_trial`].
     pub in_trials: [Vec<Hypothesis<N>>; 2],
     /// Rounds of the search.
     pub search_trace: Vec<SearchRound>,

@@ -11,11 +11,11 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::course::Channels;
 use crate::data::noise::dot;
-use crate::data::prepared_session::PreparedSession;
+use crate::fitting::fit::{Fitted, Precision};
 use crate::hypothesis::priors;
 use crate::hypothesis::{Coordinate, Hypothesis};
-use crate::joint_torque::free_run::{CHANGE, State, slope_into};
-use crate::selection::fit::{Fitted, Precision};
+use crate::measurement_model::free_run::{CHANGE, State, slope_into};
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::normal_equations::solve;
 
 /// Length of a run \[s\].

@@ -6,10 +6,10 @@ use arm_core::effect::{Local, Place};
 use arm_core::{Pose, jacobian};
 
 use crate::data::course::Course;
-use crate::data::prepared_session::{PreparedSession, Rest};
 use crate::data::session::ComparisonMode;
 use crate::data::valid_segments::{ObservableForce, ValidSegments, widened};
 use crate::hypothesis::Hypothesis;
+use crate::prepared_session::{PreparedSession, Rest};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// Share of the samples that must be left when those at which joints with dry friction rest are left out: of a simulated motion, which sticks as
@@ -57,11 +57,6 @@ impl<const N: usize> PreparedSession<'_, N> {
     pub(crate) fn is_at_rest(&self, group: usize, sample: usize) -> bool {
         let rest = self.resting.get(group);
         rest.is_some_and(|rest| rest.left_out.get(sample) == Some(&true))
-    }
-
-    /// Whether samples are left out because a joint rests there.
-    pub(crate) fn leaves_out_rest(&self) -> bool {
-        !self.resting.is_empty()
     }
 
     /// Compares rest as motion, until other joints are dry.

@@ -9,10 +9,14 @@ use arm_sim::SimulationError;
 
 use crate::data::course::{Channels, smooth};
 use crate::hypothesis::Hypothesis;
+use crate::linearization::linearized_run::{ASTRAY, Linear};
+use crate::linearization::origin::Origin;
+use crate::linearization::plant::{Balance, Hand, Plant, balance, hands};
 use crate::measurement_model::start::held_at_start;
-use crate::sensitivity::linearized_run::{ASTRAY, Linear};
-use crate::sensitivity::origin::Origin;
-use crate::sensitivity::plant::{Balance, Hand, Plant, balance, hands};
+
+/// Response of the channels to one unit of a number, by group.
+#[derive(Clone, Debug)]
+pub struct Response(pub Vec<Channels>);
 
 /// A change of a hypothesis whose response is computed.
 #[derive(Clone, Debug)]

@@ -12,15 +12,14 @@ use arm_sim::SimulationError;
 
 use crate::data::course::{Channels, Course, difference, smooth};
 use crate::data::noise::dot;
-use crate::data::prepared_session::PreparedSession;
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::hypothesis::{Hypothesis, Target};
-use crate::sensitivity::linear_response::Change;
+use crate::linearization::linear_response::Change;
+use crate::linearization::linearized_run::{ASTRAY, Linear};
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::slope;
-use crate::sensitivity::linearized_run::{ASTRAY, Linear};
 use crate::sensitivity::normal_equations::solve;
-use crate::trial_specific::component::SLOW;
-use crate::trial_specific::component::shapes_of;
+use crate::trial_specific::component::{SLOW, shapes_of};
 
 /// Times that channels are weighed anew by what is left of them.
 const REWEIGHTINGS: usize = 2;

@@ -6,11 +6,11 @@ use crate::GapError;
 use crate::candidates::library::Library;
 use crate::data::course::Channels;
 use crate::data::noise::{Noise, dot};
-use crate::data::prepared_session::PreparedSession;
 use crate::hypothesis::priors;
+use crate::linearization::linear_response::Response;
+use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::solve;
-use crate::sensitivity::response::Response;
 
 /// Samples of the common band, on either side, among which the size of what is left is measured.
 const AROUND: usize = 32;

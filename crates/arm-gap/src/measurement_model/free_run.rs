@@ -29,7 +29,7 @@ pub(crate) const CHANGE: [f64; 2] = [1e-5, 1e-4];
 pub(crate) type State<const N: usize> = (Joints<f64, N>, Joints<f64, N>);
 
 /// Writes the slope of a residual when something changes it to another.
-pub(super) fn slope_into(slope: &mut [f64], residual: &[f64], other: &[f64], change: f64) {
+pub(crate) fn slope_into(slope: &mut [f64], residual: &[f64], other: &[f64], change: f64) {
     for ((slope, here), there) in slope.iter_mut().zip(residual).zip(other) {
         *slope = (here - there) / change;
     }

@@ -6,8 +6,8 @@ use arm_core::effect::Motion;
 use arm_core::{Joints, Plane};
 
 use crate::data::course::Channels;
+use crate::linearization::plant::{Balance, Plant};
 use crate::measurement_model::start::held_at_start;
-use crate::sensitivity::plant::{Balance, Plant};
 
 /// A hypothesis from which changes are computed: that of the run, or one beside it.
 pub struct Origin<const N: usize> {
