@@ -23,6 +23,10 @@ LITERAL = re.compile(
     flags=re.X | re.S,
 )
 FUNCTION = re.compile(r"\bfn\s+(\w+)")
+PUBLIC_FUNCTION = re.compile(r"\bpub(?:\([^)]*\))?\s+(?:const\s+)?fn\s+(\w+)")
+METHOD = re.compile(r"(?:\.|\bSelf::)(\w+)(?:::<[^>]*>)?\(")
+INHERENT = re.compile(r"^impl\b(?:(?!\bfor\b)[^{;])*(?=\{)", flags=re.M)
+"""An `impl` of a type's own methods; a block of a trait has `for` before its brace."""
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\([^)]*\))?\s+)?mod\s+\w+\s*(?=\{)")
 LOADERS = {"importlib", "pkgutil", "runpy"}
 USE = re.compile(r"\b(pub(?:\([^)]*\))?\s+)?use\s+([^;]+);")
@@ -348,3 +352,37 @@ def rust_imports(source: Path) -> dict[str, set[str]]:
         name(module): {name(other) for path in file.paths if path and (other := defined_in(path)) != module}
         for module, file in files.items()
     }
+
+
+def rust_folder_imports(source: Path) -> dict[str, set[str]]:
+    """Return the folders and the files beside them that each folder of a crate, and each file beside it, uses; the root is left out."""
+    return _between_folders(rust_imports(source))
+
+
+def rust_folder_calls(source: Path, common: frozenset[str] = frozenset()) -> dict[str, set[str]]:
+    """Return the folders of a crate whose methods each folder calls, by names that one public method has and no other function of the crate.
+
+    * `common` - names that types of other crates have as well
+    """
+    codes = {
+        "::".join(("crate", *rust_module(path, source))): bare(path.read_text(encoding="utf-8")) for path in sorted(source.rglob("*.rs"))
+    }
+    places: dict[str, set[str]] = {}
+    public: set[str] = set()
+    for module, code in codes.items():
+        for name in FUNCTION.findall(code):
+            places.setdefault(name, set()).add(module)
+        for block in INHERENT.finditer(code):
+            public |= set(PUBLIC_FUNCTION.findall(code[block.start() : block_end(code, block.start())]))
+    home = {name: next(iter(places[name])) for name in public - common if len(places[name]) == 1}
+    called = {module: {home[name] for name in METHOD.findall(code) if name in home} for module, code in codes.items()}
+    return _between_folders(called)
+
+
+def _between_folders(graph: Mapping[str, set[str]]) -> dict[str, set[str]]:
+    folders: dict[str, set[str]] = {}
+    for module, used in graph.items():
+        if module != "crate":
+            own = module.split("::")[1]
+            folders[own] = folders.get(own, set()) | {other.split("::")[1] for other in used if other != "crate"} - {own}
+    return folders

@@ -42,6 +42,32 @@ def test_no_circle_in_a_crate() -> None:
     assert found == []
 
 
+def test_no_circle_between_the_folders_of_a_crate() -> None:
+    """Nor with the files beside them."""
+    graphs = {source.parent.name: structure.rust_folder_imports(source) for source in CRATES}
+    assert {"selection", "sensitivity", "prepared_session"} <= graphs["arm-gap"].keys()
+    assert {name: circles for name, graph in graphs.items() if (circles := structure.circles(graph))} == {}
+
+
+OFTEN_NAMED = frozenset({"segments", "span"})
+"""Methods of `arm-gap` whose names types of other crates have as well."""
+
+
+def test_the_modules_of_the_gap_workflow_are_in_the_order_that_its_documentation_states() -> None:
+    """By what they import and by whose methods they call: types of the first modules have methods in later ones."""
+    source = ROOT / "crates" / "arm-gap" / "src"
+    stated = (source / "lib.rs").read_text(encoding="utf-8").partition("## Order")[2].partition("\n\n")[0]
+    order = re.findall(r"`(\w+)`", stated)
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    assert " ← ".join(order) in page
+    imports = structure.rust_folder_imports(source)
+    assert sorted(order) == sorted(imports)
+    calls = structure.rust_folder_calls(source, OFTEN_NAMED)
+    assert len(calls["search"]) > 5
+    later = {name: set(order[order.index(name) :]) - {name} for name in order}
+    assert {name: found for name in order if (found := (imports[name] | calls.get(name, set())) & later[name])} == {}
+
+
 def test_a_crate_whose_library_is_not_tested_has_no_tests_in_it() -> None:
     """`test = false` saves a second compilation of a library, and would leave its unit tests unasked."""
     asked = [source.parent for source in CRATES if "\ntest = false" in (source.parent / "Cargo.toml").read_text(encoding="utf-8")]
@@ -110,10 +136,10 @@ def test_the_path_of_find_gap_does_not_go_back_and_forth() -> None:
     assert asked == ["reach", "play", "find_gap"]
     core = ROOT / "crates" / "arm-gap" / "src"
     folders = structure.folders_of_functions(core)
-    selection = [structure.bare((core / "selection" / f"{name}.rs").read_text()) for name in ("search", "conclusion")]
-    led = [*structure.calls(selection[0], "search"), *structure.calls(selection[1], "concluded")]
+    search = [structure.bare((core / "search" / f"{name}.rs").read_text()) for name in ("rounds", "conclusion")]
+    led = [*structure.calls(search[0], "search"), *structure.calls(search[1], "concluded")]
     rooms = ["data", *(folders[name] for name in led if name in folders), "results"]
-    assert rooms.count("selection") > 5
+    assert rooms.count("search") > 5
     assert max(structure.returns(rooms).values()) + len(asked) <= 5
 
 
@@ -258,6 +284,18 @@ def test_a_circle_in_a_crate_is_found(tmp_path: Path, one: str, other: str) -> N
 def test_a_circle_of_a_module_and_its_part_is_found(tmp_path: Path) -> None:
     root = tree(tmp_path, {"lib.rs": "mod a;", "a/mod.rs": "mod part; fn f() { part::g(); }", "a/part.rs": "use super::f;"})
     assert structure.circles(structure.rust_imports(root)) == [["crate::a", "crate::a::part"]]
+
+
+def test_a_circle_between_the_folders_of_a_crate_is_found(tmp_path: Path) -> None:
+    """Also where no files are in a circle, and through a method that a type has in another folder."""
+    files = {"lib.rs": "mod a; mod b; mod c;", "a/mod.rs": "mod x; mod y;", "b/mod.rs": "mod x; mod y;", "a/y.rs": "use crate::b::x::F;"}
+    root = tree(tmp_path, {**files, "a/x.rs": "pub struct X;", "b/x.rs": "pub struct F;", "b/y.rs": "use crate::a::x::X;", "c.rs": ""})
+    assert structure.circles(structure.rust_imports(root)) == []
+    assert structure.circles(structure.rust_folder_imports(root)) == [["a", "b"]]
+    method = "use crate::a::x::X;\nimpl<const N: usize> X { pub(crate) fn drawn(&self) {} fn own(&self) {} }"
+    tree(tmp_path, {"b/y.rs": method, "c.rs": "fn f(x: X) { x.drawn(); x.own(); }\nimpl Drop for X { pub fn g() {} }", "a/y.rs": "x.g();"})
+    assert structure.rust_folder_calls(root) == {"a": set(), "b": set(), "c": {"b"}}
+    assert structure.rust_folder_calls(root, frozenset({"drawn"}))["c"] == set()
 
 
 def test_what_only_looks_like_a_circle_is_none(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 //!
 //! ## Order of the modules
-//! Each module uses those before it, and none behind it:
+//! A module uses modules before it, and none behind it. Types of the first modules have methods in later ones.
 //!
 //! `error` ← `hypothesis` ← `data` ← `measurement_model` ← `linearization` ← `prepared_session` ← `sensitivity` ← `candidates` ←
 //! `fitting` ← `preparation` ← `selection` ← `trial_specific` ← `search` ← `results`

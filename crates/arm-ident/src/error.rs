@@ -21,7 +21,7 @@ pub enum IdentError {
         /// Movements tried.
         evaluations: usize,
         /// The limits that the best movement exceeds at the slowest pace.
-        nearest: crate::experiment_design::limit::Excess,
+        nearest: crate::movement_limits::Excess,
     },
     /// The simulated arm moves elsewhere than the measured one.
     #[error(

@@ -4,6 +4,7 @@ pub mod cascade;
 pub mod error;
 pub mod experiment_design;
 pub mod inference;
+pub mod movement_limits;
 pub mod regression;
 pub mod results;
 pub mod threads;

@@ -5,7 +5,7 @@
 
 use crate::error::IdentError;
 use crate::experiment_design::forecast::{Demand, Forecast, Question, Seen, Task, said};
-use crate::experiment_design::limit::{Excess, Limit};
+use crate::movement_limits::{Excess, Limit};
 use arm_core::{Joints, Shape};
 use arm_numerics::NumericsError;
 use arm_sim::Normal;

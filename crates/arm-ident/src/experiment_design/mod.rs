@@ -2,5 +2,4 @@
 
 pub mod design;
 pub mod forecast;
-pub mod limit;
 pub mod results;

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::experiment_design::design;
 use crate::experiment_design::forecast::{self, Predicted};
-use crate::experiment_design::limit::Excess;
+use crate::movement_limits::Excess;
 
 /// How well one parameter will be known.
 #[derive(Clone, Debug, PartialEq, Serialize)]

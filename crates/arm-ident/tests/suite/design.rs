@@ -5,7 +5,7 @@ use arm_core::{Contact, Elbow, Joints, Robot, Shape, sample_arms};
 use arm_ident::IdentError;
 use arm_ident::experiment_design::design::{Allowed, design};
 use arm_ident::experiment_design::forecast::{Accuracy, Question, Task, forecast};
-use arm_ident::experiment_design::limit::{Excess, Limit};
+use arm_ident::movement_limits::{Excess, Limit};
 use arm_ident::regression::trial::{Model, Tolerance};
 
 fn question(tolerance: Tolerance) -> Question<2> {
