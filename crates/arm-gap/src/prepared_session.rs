@@ -8,7 +8,7 @@ use arm_ident::threads::parallel;
 
 use crate::GapError;
 use crate::data::course::{Channels, Course};
-use crate::data::noise::Noise;
+use crate::data::noise::NoiseModel;
 use crate::data::repeats::groups;
 use crate::data::session::Session;
 use crate::data::valid_segments::{ObservableForce, ValidSegments};
@@ -44,7 +44,7 @@ pub struct PreparedSession<'a, const N: usize> {
     /// One trial of each group, in whose motion responses are computed.
     pub references: Vec<usize>,
     /// What makes rows white.
-    pub noise: Noise,
+    pub noise: NoiseModel,
     /// Whether the noise was read off repeats.
     pub repeated: bool,
     /// Trials that are fitted.
@@ -83,7 +83,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// [`GapError`] for insufficient data.
     pub fn with_noise(
         session: &'a Session<N>,
-        noise: Noise,
+        noise: NoiseModel,
         threads: usize,
     ) -> Result<Self, GapError> {
         session.check()?;
@@ -167,7 +167,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Number of rows that the fit trials are compared by.
-    pub(crate) fn rows_told(&self) -> usize {
+    pub(crate) fn compared_rows(&self) -> usize {
         let channels = self.session.channels();
         let fitted = self.fitted.iter();
         fitted

@@ -9,7 +9,7 @@ use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::prepared_session::PreparedSession;
 use arm_gap::results as core;
 use arm_gap::results::{SearchInput, TrialFile, Version};
-use arm_gap::selection::model_discrimination::Contest;
+use arm_gap::selection::model_discrimination::Discrimination;
 use arm_ident::threads::parallel;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -219,11 +219,11 @@ pub fn look(
     ) -> PyResult<Screening> {
         let session = call.session(chain)?;
         let callback = ProgressCallback::of(progress);
-        let done = call.studied(py, &session, |s| s.look(&|w, s| callback.tell(w, s)));
-        let (prepared, look) = callback.or_raised(done)?;
+        let done = call.studied(py, &session, |s| s.screen(&|w, s| callback.tell(w, s)));
+        let (prepared, screening) = callback.or_raised(done)?;
         let files = call.files();
         let input = call.input(&files);
-        py.detach(|| core::Screening::of(&prepared, &look, &input))
+        py.detach(|| core::Screening::of(&prepared, &screening, &input))
             .map(Screening)
             .map_err(refused)
     }
@@ -320,10 +320,10 @@ pub fn distances(
         let outcome = py.detach(|| {
             let noise = PreparedSession::new(&all, threads)?.noise;
             let prepared = PreparedSession::with_noise(&without, noise, threads)?;
-            let contest = Contest::new(prepared, named, rivals)?;
-            let mut found = vec![Some(contest.distances(None)?)];
-            let one = |i: usize| contest.distances(planned[i].first()).ok();
-            let each = contest.prepared().parallel(planned.len(), one);
+            let discrimination = Discrimination::new(prepared, named, rivals)?;
+            let mut found = vec![Some(discrimination.distances(None)?)];
+            let one = |i: usize| discrimination.distances(planned[i].first()).ok();
+            let each = discrimination.prepared().parallel(planned.len(), one);
             found.extend(each);
             Ok(found)
         });

@@ -14,7 +14,7 @@ use crate::data::session::{ComparisonMode, Session};
 use crate::linearization::linear_response::Response;
 use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
-use crate::sensitivity::rows::{Columns, Rows};
+use crate::sensitivity::rows::{Columns, WhitenedRows};
 
 /// All candidates of a session with their responses; those that the movements do not excite are left out.
 pub struct Library {
@@ -122,7 +122,7 @@ impl Library {
     pub(crate) fn columns<const N: usize>(
         &self,
         prepared: &PreparedSession<N>,
-        rows: &Rows,
+        rows: &WhitenedRows,
     ) -> &Columns {
         let all = || self.responses.iter().flatten().collect::<Vec<_>>();
         self.columns.get_or_init(|| rows.columns(prepared, &all()))
@@ -137,7 +137,7 @@ impl Library {
         prepared: &PreparedSession<N>,
         point: &LinearizationPoint<N>,
         named: &[(Candidate, Effect<f64>)],
-    ) -> Result<Vec<Option<Twin>>, GapError> {
+    ) -> Result<Vec<Option<LibraryEntry>>, GapError> {
         let mut places = Vec::new();
         self.columns = OnceLock::new();
         for (own, mut effect) in named.iter().cloned() {
@@ -166,7 +166,7 @@ impl Library {
                 Err(other) => return Err(other),
             }
             let place = self.candidates.len();
-            places.push(Some(Twin { place, sizes }));
+            places.push(Some(LibraryEntry { place, sizes }));
             self.candidates.push(exact);
         }
         Ok(places)
@@ -174,7 +174,7 @@ impl Library {
 }
 
 /// A named effect among the questions.
-pub struct Twin {
+pub struct LibraryEntry {
     /// Its place.
     pub place: usize,
     /// The coefficients of its columns.

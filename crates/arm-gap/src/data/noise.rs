@@ -75,7 +75,7 @@ impl Thinned {
 
 /// What makes rows white.
 #[derive(Clone, Debug)]
-pub struct Noise {
+pub struct NoiseModel {
     whiteners: Vec<Whitener>,
     /// What each sample weighs, by trial; nothing where all weigh the same.
     weights: Vec<Channels>,
@@ -83,7 +83,7 @@ pub struct Noise {
     mix: Vec<f64>,
 }
 
-impl Noise {
+impl NoiseModel {
     /// White noise of unit size, before it is estimated.
     ///
     /// # Errors
@@ -389,7 +389,7 @@ mod tests {
         session.weights = vec![0.25];
         let course = Arc::new(session.course(0).expect("a course"));
         let samples = ValidSegments::of(&session.trials[0], &course, &[], Arc::default());
-        let noise = Noise::unknown(4).expect("a model");
+        let noise = NoiseModel::unknown(4).expect("a model");
         let noise = noise.weighed(std::slice::from_ref(&course));
         let compared = (&samples, &noise.whitening(&samples));
         let weighed = noise.whiten_in(0, &course.seen, compared);
@@ -427,7 +427,7 @@ mod tests {
         };
         let mut one = || (0..CHANNELS).map(|_| slow()).collect::<Channels>();
         let series: Vec<Thinned> = (0..400).map(|_| one().into()).collect();
-        let noise = Noise::of(&series, &[], &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
+        let noise = NoiseModel::of(&series, &[], &[1.0; CHANNELS], &[1.0; CHANNELS]).unwrap();
         for c in 0..CHANNELS {
             let squares = series.iter().map(|s| {
                 let whitening = noise.whitening_at(s.observed());

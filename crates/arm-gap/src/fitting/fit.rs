@@ -5,7 +5,7 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::course::Channels;
-use crate::fitting::score_variance::{spread, told};
+use crate::fitting::score_variance::{spread, trial_scores};
 use crate::hypothesis::{Coordinate, Hypothesis, Target, departure, priors};
 use crate::linearization::linear_response::Response;
 use crate::prepared_session::PreparedSession;
@@ -31,7 +31,7 @@ const AGAIN: usize = 8;
 
 /// A hypothesis fitted to the fit trials.
 #[derive(Clone, Debug)]
-pub struct Fitted<const N: usize> {
+pub struct FittedHypothesis<const N: usize> {
     /// The hypothesis at its best.
     pub hypothesis: Hypothesis<N>,
     /// The candidates that its named effects come from.
@@ -44,7 +44,7 @@ pub struct Fitted<const N: usize> {
     pub residuals: Vec<Channels>,
 }
 
-impl<const N: usize> Fitted<N> {
+impl<const N: usize> FittedHypothesis<N> {
     /// A gain below this is none.
     pub(crate) fn enough(&self) -> f64 {
         ENOUGH + SHARE * (self.cost - self.rows as f64).max(0.0)
@@ -94,17 +94,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         point: &LinearizationPoint<N>,
         hypothesis: Hypothesis<N>,
         asked: Vec<Candidate>,
-    ) -> Result<Fitted<N>, GapError> {
+    ) -> Result<FittedHypothesis<N>, GapError> {
         let residuals = self.residuals(point, &hypothesis)?;
         let squares = point.rows.squares(self, &residuals);
         let data: f64 = squares.iter().map(|c| c.square).sum();
         let own = named(&hypothesis, &asked);
         let cost = data + departure(&hypothesis, &point.coordinates) + departure(&hypothesis, &own);
-        Ok(Fitted {
+        Ok(FittedHypothesis {
             hypothesis,
             asked,
             cost,
-            rows: self.rows_told(),
+            rows: self.compared_rows(),
             residuals,
         })
     }
@@ -117,7 +117,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub fn equations(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
         more: &Columns,
     ) -> Result<(Vec<Coordinate>, Vec<Cluster>), GapError> {
         let own = fitted.named();
@@ -130,7 +130,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn equations_with(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
         columns: (&[&Response], &Columns),
     ) -> (Vec<Coordinate>, Vec<Cluster>) {
         let rows = &point.rows;
@@ -151,7 +151,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         point: &LinearizationPoint<N>,
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
-    ) -> Result<Fitted<N>, GapError> {
+    ) -> Result<FittedHypothesis<N>, GapError> {
         let mut fitted = self.state(point, start, asked)?;
         let mut slopes: Option<Vec<Response>> = None;
         let mut lightest: usize = 0;
@@ -205,7 +205,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub fn foretold(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
     ) -> Result<f64, GapError> {
         let hypothesis = &fitted.hypothesis;
         let (coordinates, clusters) = self.equations(point, fitted, &Columns::default())?;
@@ -238,7 +238,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
-    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>), GapError> {
+    ) -> Result<(FittedHypothesis<N>, LinearizationPoint<'a, N>), GapError> {
         let mut point = self.linearize(&start)?;
         let mut before = self.state(&point, start, asked)?;
         for _ in 0..AGAIN {
@@ -406,7 +406,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     pub fn precision(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
         scale: f64,
     ) -> Result<Precision, GapError> {
         match self.equations(point, fitted, &Columns::default()) {
@@ -425,7 +425,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     pub(crate) fn precision_beside_named(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
     ) -> Precision {
         let clusters = point.rows.clusters(self, &[], &fitted.residuals);
         precision_of(fitted, (point.coordinates.clone(), clusters), 1.0)
@@ -434,7 +434,7 @@ impl<const N: usize> PreparedSession<'_, N> {
 
 /// See [`PreparedSession::precision`].
 fn precision_of<const N: usize>(
-    fitted: &Fitted<N>,
+    fitted: &FittedHypothesis<N>,
     (coordinates, clusters): (Vec<Coordinate>, Vec<Cluster>),
     scale: f64,
 ) -> Precision {
@@ -444,7 +444,7 @@ fn precision_of<const N: usize>(
         for (a, &i) in free.iter().enumerate() {
             let row = free.iter().enumerate();
             let weights: Vec<(usize, f64)> = row.map(|(b, &k)| (k, inverse[(a, b)])).collect();
-            let widen = f64::max(scale, spread(&told(&clusters, &weights)));
+            let widen = f64::max(scale, spread(&trial_scores(&clusters, &weights)));
             sd[i] = (inverse[(a, a)] * widen).sqrt();
         }
     }
@@ -453,7 +453,7 @@ fn precision_of<const N: usize>(
 
 /// The places of the coordinates that data and priors determine, and the factor of their equations.
 pub(crate) fn decided<const N: usize>(
-    fitted: &Fitted<N>,
+    fitted: &FittedHypothesis<N>,
     coordinates: &[Coordinate],
     clusters: &[Cluster],
 ) -> Option<(Vec<usize>, Cholesky)> {
@@ -482,7 +482,7 @@ mod tests {
     /// Noise leaves a cost of one for each row; a gain of 0.2 counts there, and with 10 000 too much left one of a ten thousandth more.
     #[test]
     fn much_is_left_from_a_half_beyond_noise_on_and_little_gains_count_near_it() {
-        let fitted = |cost| Fitted {
+        let fitted = |cost| FittedHypothesis {
             hypothesis: plain(),
             asked: Vec::new(),
             cost,

@@ -11,7 +11,7 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::course::Channels;
 use crate::data::noise::dot;
-use crate::fitting::fit::{Fitted, Precision};
+use crate::fitting::fit::{FittedHypothesis, Precision};
 use crate::hypothesis::priors;
 use crate::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::free_run::{CHANGE, State, slope_into};
@@ -61,7 +61,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// Fits nuisances and named effects of free swings anew, by the angles of simulated runs.
     ///
     /// `None` where the arm is not free, or cannot be followed; then what was fitted before stands.
-    pub fn refined(&self, fitted: &Fitted<N>) -> Option<(Hypothesis<N>, Precision)> {
+    pub fn refined(&self, fitted: &FittedHypothesis<N>) -> Option<(Hypothesis<N>, Precision)> {
         if !self.session.swings_freely() {
             return None;
         }

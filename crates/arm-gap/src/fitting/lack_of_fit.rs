@@ -1,7 +1,7 @@
 //! What a fitted hypothesis leaves: more than repeats differ among themselves?
 
 use crate::data::noise::{orthogonal, project_off};
-use crate::fitting::fit::Fitted;
+use crate::fitting::fit::FittedHypothesis;
 use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
@@ -38,7 +38,7 @@ impl LackOfFit {
 pub fn lack_of_fit<const N: usize>(
     prepared: &PreparedSession<N>,
     point: &LinearizationPoint<N>,
-    fitted: &Fitted<N>,
+    fitted: &FittedHypothesis<N>,
 ) -> LackOfFit {
     let (mut common, mut common_dof, mut trial_specific, mut apart_dof) = (0.0, 0.0, 0.0, 0.0);
     let mut runs = Vec::new();
@@ -63,11 +63,11 @@ pub fn lack_of_fit<const N: usize>(
             .collect();
         let n = rows.len() as f64;
         let size = rows[0].len();
-        let told: usize = valid_segments
+        let compared: usize = valid_segments
             .rows_per_channel(prepared.session.channels())
             .iter()
             .sum();
-        let free = told.saturating_sub(columns.len()) as f64;
+        let free = compared.saturating_sub(columns.len()) as f64;
         let mut differ = vec![0.0; size];
         for (i, differ) in differ.iter_mut().enumerate() {
             let mean = rows.iter().map(|r| r[i]).sum::<f64>() / n;

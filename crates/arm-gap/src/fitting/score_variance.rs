@@ -8,7 +8,7 @@ use crate::sensitivity::normal_equations::Cluster;
 const BELIEF: f64 = 6.0;
 
 /// Score of an effect in one trial.
-pub struct Told {
+pub struct TrialScore {
     /// The movement; repeats share it.
     configuration: usize,
     /// Product of the residual with the effect.
@@ -20,12 +20,12 @@ pub struct Told {
 /// Scores of an effect in each trial.
 ///
 /// * `weights` - columns and their weights in the effect, from all movements together
-pub fn told(clusters: &[Cluster], weights: &[(usize, f64)]) -> Vec<Told> {
-    let mut all: Vec<Told> = Vec::with_capacity(clusters.len());
+pub fn trial_scores(clusters: &[Cluster], weights: &[(usize, f64)]) -> Vec<TrialScore> {
+    let mut all: Vec<TrialScore> = Vec::with_capacity(clusters.len());
     for (i, c) in clusters.iter().enumerate() {
         // Repeats with the same samples share their products.
         let same = (0..i).rfind(|&k| Arc::ptr_eq(&clusters[k].gram, &c.gram));
-        all.push(Told {
+        all.push(TrialScore {
             configuration: c.configuration,
             score: weights.iter().fold(0.0, |s, (i, w)| s + w * c.score[*i]),
             expected: same.map_or_else(|| expected(c, weights), |k| all[k].expected),
@@ -43,11 +43,11 @@ fn expected(c: &Cluster, weights: &[(usize, f64)]) -> f64 {
 
 /// By how much movements differ in the size that they give an effect, beyond what the noise makes: the part of their squared
 /// distances from the common size that exceeds what chance makes in one of a thousand.
-pub fn unlike(told: &[Told]) -> f64 {
-    let groups = told.iter().map(|t| t.configuration + 1).max();
+pub fn unlike(trial_scores: &[TrialScore]) -> f64 {
+    let groups = trial_scores.iter().map(|t| t.configuration + 1).max();
     let (mut square, mut dof) = (0.0, -1.0);
     for group in 0..groups.unwrap_or(0) {
-        let own = told.iter().filter(|t| t.configuration == group);
+        let own = trial_scores.iter().filter(|t| t.configuration == group);
         let (score, information) = own.fold((0.0, 0.0), |(s, i), t| (s + t.score, i + t.expected));
         if information > 0.0 {
             square += (score - information) * (score - information) / information;
@@ -64,11 +64,14 @@ pub fn unlike(told: &[Told]) -> f64 {
 }
 
 /// Variance of a score between repeats of one movement over what the noise allows, shrunk towards one; at least one.
-pub fn spread(told: &[Told]) -> f64 {
-    let groups = told.iter().map(|t| t.configuration + 1).max();
+pub fn spread(trial_scores: &[TrialScore]) -> f64 {
+    let groups = trial_scores.iter().map(|t| t.configuration + 1).max();
     let (mut observed, mut predicted, mut dof) = (0.0, 0.0, 0.0);
     for group in 0..groups.unwrap_or(0) {
-        let own: Vec<&Told> = told.iter().filter(|t| t.configuration == group).collect();
+        let own: Vec<&TrialScore> = trial_scores
+            .iter()
+            .filter(|t| t.configuration == group)
+            .collect();
         if own.len() < 2 {
             continue;
         }
@@ -106,7 +109,7 @@ mod tests {
 
     #[test]
     fn movements_are_unlike_where_their_sizes_differ_by_more_than_chance() {
-        let of = |sizes| unlike(&told(&trials(sizes), &[(0, 1.0)]));
+        let of = |sizes| unlike(&trial_scores(&trials(sizes), &[(0, 1.0)]));
         assert_eq!(of(&[1.1, 0.8, 1.2, 0.9, 1.0, 1.0]), 0.0);
         // One movement makes it all: squared distances of 5 · 25 + 625, less the 20.5 that chance makes of five.
         let one = of(&[6.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -117,7 +120,7 @@ mod tests {
     /// six with the variance of the noise model.
     #[test]
     fn six_trials_as_the_noise_says_stand_beside_what_repeats_scatter() {
-        let of = |trials: &[Cluster]| spread(&told(trials, &[(0, 1.0)]));
+        let of = |trials: &[Cluster]| spread(&trial_scores(trials, &[(0, 1.0)]));
         let mut repeats = trials(&[0.0, 2.0]);
         repeats[1].configuration = 0;
         let found = of(&repeats);

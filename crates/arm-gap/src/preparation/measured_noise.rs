@@ -7,8 +7,8 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
 use crate::data::course::Channels;
-use crate::data::noise::{Noise, Thinned, dot};
-use crate::fitting::fit::{Fitted, decided};
+use crate::data::noise::{NoiseModel, Thinned, dot};
+use crate::fitting::fit::{FittedHypothesis, decided};
 use crate::linearization::linear_response::Response;
 use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -52,7 +52,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     pub fn measure_noise_left(
         &mut self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
     ) -> Result<(), GapError> {
         let named = self.responses_at(point, &fitted.hypothesis, &fitted.named())?;
         let each: Vec<&Response> = named.iter().collect();
@@ -119,13 +119,13 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// The noise of deviations, and how far each is shifted, found in turns: as much is taken for a shift as the noise and
     /// what is known of shifts allow.
     ///
-    /// * `fitted` - the like of [`Noise::of`]'s `taken`, of what is common to all deviations
+    /// * `fitted` - the like of [`NoiseModel::of`]'s `taken`, of what is common to all deviations
     fn noise_of(
         &self,
         (deviations, fitted): (&[Thinned], &[Thinned]),
         shifts: &[Arc<Vec<Thinned>>],
         (range, observable_share): (&[f64], &[f64]),
-    ) -> Result<Noise, GapError> {
+    ) -> Result<NoiseModel, GapError> {
         /// Alternations: the noise weights the fit of the shifts of trials, and residuals without the shifts give the noise.
         const ITERATIONS: usize = 3;
         let known: Vec<f64> = self
@@ -138,7 +138,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         // there the noise of speeds makes all that resists too small.
         let apart = self.session.compares_contact_torques();
         let of = |deviations: &[Thinned], taken: &[Thinned]| {
-            let noise = Noise::of(deviations, taken, range, observable_share)?;
+            let noise = NoiseModel::of(deviations, taken, range, observable_share)?;
             Ok::<_, GapError>(if apart { noise.uncorrelated() } else { noise })
         };
         let mut noise = of(deviations, fitted)?;

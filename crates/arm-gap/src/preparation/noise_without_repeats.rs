@@ -5,7 +5,7 @@ use arm_numerics::Matrix;
 use crate::GapError;
 use crate::candidates::library::Library;
 use crate::data::course::Channels;
-use crate::data::noise::{Noise, dot};
+use crate::data::noise::{NoiseModel, dot};
 use crate::hypothesis::priors;
 use crate::linearization::linear_response::Response;
 use crate::prepared_session::PreparedSession;
@@ -27,7 +27,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         &self,
         point: &LinearizationPoint<N>,
         (range, observable_share): (&[f64], &[f64]),
-    ) -> Result<Noise, GapError> {
+    ) -> Result<NoiseModel, GapError> {
         let mut left = self.unexplained(point)?;
         let mut weights = vec![Channels::new(); self.courses.len()];
         let mean: Vec<f64> = (0..range.len())
@@ -60,7 +60,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 weights[trial].push(whole);
             }
         }
-        Noise::without_repeats(&left, range, (observable_share, weights))
+        NoiseModel::without_repeats(&left, range, (observable_share, weights))
     }
 
     /// What is left of residuals when everything that the catalogue could explain is taken out, to first order.

@@ -1,7 +1,7 @@
 //! A session made ready: samples at rest are left out, and the noise is measured.
 
 use crate::GapError;
-use crate::data::noise::Noise;
+use crate::data::noise::NoiseModel;
 use crate::data::session::Session;
 use crate::prepared_session::PreparedSession;
 
@@ -11,7 +11,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// # Errors
     /// [`GapError`] for insufficient data, or a model that cannot be simulated.
     pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
-        let noise = Noise::unknown(session.channels())?;
+        let noise = NoiseModel::unknown(session.channels())?;
         let mut prepared = Self::with_noise(session, noise, threads)?;
         let mut given = prepared.linearize(&session.starting())?;
         let all = prepared.fitted.clone();

@@ -237,7 +237,7 @@ mod tests {
 
     use super::*;
     use crate::data::course::tests::of_one;
-    use crate::data::noise::Noise;
+    use crate::data::noise::NoiseModel;
     use crate::hypothesis::tests::plain;
 
     fn with(known: Vec<Effect<f64>>) -> Hypothesis<2> {
@@ -279,7 +279,7 @@ mod tests {
         let mut session = of_one(sample_arms::mechanical_arm(), trial);
         session.comparison = ComparisonMode::Torque;
         session.effects = vec![Effect::new(Kind::Coulomb, 1).with(&[0.2, 0.01])];
-        let noise = Noise::unknown(session.channels()).expect("white");
+        let noise = NoiseModel::unknown(session.channels()).expect("white");
         let mut prepared = PreparedSession::with_noise(&session, noise, 1).expect("a session");
         let point = prepared.linearize(&session.given()).expect("torques");
         assert!(prepared.leave_out_rest(&point));

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Named;
 use super::simulated_trial::{SimulatedTrial, Version, free_size, size};
-use crate::selection::held_out::{Gap, Left, held_out};
+use crate::selection::held_out::{HeldOutGap, TrialResidual, held_out};
 
 /// Where the gap of a channel is open on the test trials.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -73,10 +73,10 @@ pub fn channel_names(joints: usize, led: bool) -> Vec<String> {
 ///
 /// The floor is what test trials differ by from repeats of them, after their own simulated differences: their own noise, and not that of all
 /// trials, for it is in what is left on them as well. Where no test trial has a repeat, what the repeats of other movements differ by.
-fn tested(trials: &[SimulatedTrial], version: Version) -> Vec<Gap> {
-    let left: Vec<Left> = trials
+fn tested(trials: &[SimulatedTrial], version: Version) -> Vec<HeldOutGap> {
+    let left: Vec<TrialResidual> = trials
         .iter()
-        .map(|t| Left {
+        .map(|t| TrialResidual {
             group: t.group,
             test: t.test,
             rate: t.rate,
@@ -92,7 +92,7 @@ fn tested(trials: &[SimulatedTrial], version: Version) -> Vec<Gap> {
     held_out(&left)
 }
 
-fn opened(gap: &Gap, trials: &[SimulatedTrial]) -> Option<Open> {
+fn opened(gap: &HeldOutGap, trials: &[SimulatedTrial]) -> Option<Open> {
     gap.open.map(|open| Open {
         trial: trials[open.trial].file.clone(),
         t_start: open.span.0,

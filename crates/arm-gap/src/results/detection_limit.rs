@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{Named, placed};
 use crate::candidates::candidate::Candidate;
 use crate::search::first_order_screening;
-use crate::selection::search_state::{self, Ruled};
+use crate::selection::search_state::{self, DetectionLimit};
 
 /// An effect that was tested and not named: the smallest size that these data would have shown, and what it would explain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -34,12 +34,12 @@ pub struct Limit {
 ///
 /// * `hidden` - laws of joints that friction holds, which no data of a joint at rest can show
 pub(super) fn limits(
-    ruled: &[Ruled],
+    detection_limits: &[DetectionLimit],
     named: &[(String, Option<usize>, Option<String>)],
     hidden: &[Effect<f64>],
 ) -> Vec<Limit> {
     let mut all: Vec<Limit> = Vec::new();
-    for one in ruled {
+    for one in detection_limits {
         if named.contains(&placed(one.effect.kind, one.effect.index)) {
             continue;
         }
@@ -182,9 +182,13 @@ mod tests {
 
     use super::*;
 
-    fn ruled(kind: &str, index: usize, (gain, price, smallest): (f64, f64, f64)) -> Ruled {
+    fn detection_limit(
+        kind: &str,
+        index: usize,
+        (gain, price, smallest): (f64, f64, f64),
+    ) -> DetectionLimit {
         let kind = Kind::named(kind).expect("a kind");
-        Ruled {
+        DetectionLimit {
             effect: Effect::new(kind, index),
             free: vec![0],
             gain,
@@ -196,10 +200,10 @@ mod tests {
     /// Play that the force shows along y, and hardly along z, where it never turns over.
     #[test]
     fn each_size_has_its_own_limit() {
-        let mut play = ruled("backlash", 0, (3.0, 20.0, 2e-5));
+        let mut play = detection_limit("backlash", 0, (3.0, 20.0, 2e-5));
         play.free = vec![0, 1];
         play.smallest = vec![2e-5, 3e-3];
-        let mut along_y = ruled("backlash", 0, (4.0, 20.0, 1e-5));
+        let mut along_y = detection_limit("backlash", 0, (4.0, 20.0, 1e-5));
         along_y.smallest = vec![1e-5];
         let limits = limits(&[play, along_y], &[], &[]);
         let found: Vec<_> = limits
@@ -212,15 +216,15 @@ mod tests {
     #[test]
     fn of_several_shapes_the_clearest_size_and_the_most_gain_count() {
         let all = [
-            ruled("coulomb", 0, (3.0, 20.0, 0.05)),
-            ruled("coulomb", 0, (8.0, 20.0, 0.04)),
-            ruled("coulomb", 0, (5.0, 20.0, 0.03)),
+            detection_limit("coulomb", 0, (3.0, 20.0, 0.05)),
+            detection_limit("coulomb", 0, (8.0, 20.0, 0.04)),
+            detection_limit("coulomb", 0, (5.0, 20.0, 0.03)),
             // Not seen at any size; and named.
-            ruled("viscous", 0, (0.0, 20.0, f64::INFINITY)),
-            ruled("viscous", 1, (90.0, 20.0, 0.02)),
-            ruled("force_bias", 1, (1.0, 20.0, 0.3)),
+            detection_limit("viscous", 0, (0.0, 20.0, f64::INFINITY)),
+            detection_limit("viscous", 1, (90.0, 20.0, 0.02)),
+            detection_limit("force_bias", 1, (1.0, 20.0, 0.3)),
             // More than the catalogue allows.
-            ruled("motor_inertia", 2, (0.0, 20.0, 2.5e10)),
+            detection_limit("motor_inertia", 2, (0.0, 20.0, 2.5e10)),
         ];
         let named = [("viscous".to_owned(), Some(2), None)];
         let limits = limits(&all, &named, &[]);
@@ -242,7 +246,11 @@ mod tests {
     #[test]
     fn a_law_of_a_joint_that_friction_holds_is_seen_at_no_size() {
         let spring = Effect::new(Kind::Elastic, 2);
-        let limits = limits(&[ruled("viscous", 0, (1.0, 20.0, 0.1))], &[], &[spring]);
+        let limits = limits(
+            &[detection_limit("viscous", 0, (1.0, 20.0, 0.1))],
+            &[],
+            &[spring],
+        );
         let found: Vec<_> = limits
             .iter()
             .map(|l| (l.kind.as_str(), l.joint, l.at_least))

@@ -146,7 +146,7 @@ pub(super) fn sign_in_files(kind: Kind, force_on_robot: bool) -> f64 {
 impl Missing {
     /// A named effect of all trials.
     pub(super) fn named<const N: usize>(
-        named: &model_selection::NamedEffect,
+        named: &model_selection::MissingEffect,
         finding: &Finding<N>,
         input: &SearchInput<'_>,
     ) -> Self {

@@ -17,7 +17,7 @@ use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::fitting::lack_of_fit::LackOfFit;
 use crate::prepared_session::PreparedSession;
 use crate::search::conclusion::Finding;
-use crate::search::first_order_screening::Look;
+use crate::search::first_order_screening::FirstOrderScreening;
 
 /// Lack of fit of a model on the fit trials; not a number without repeats.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -134,7 +134,11 @@ impl GapResult {
             verdict,
             places: Vec::new(),
             gap,
-            would_have_seen: limits(&finding.ruled, &named, &prepared.session.hidden_laws()),
+            would_have_seen: limits(
+                &finding.detection_limits,
+                &named,
+                &prepared.session.hidden_laws(),
+            ),
             unexplained: if verdict == Verdict::Unexplained || !effects.is_empty() {
                 at_most(share, 1.0)
             } else {
@@ -203,7 +207,7 @@ struct OpenRow<'a> {
 }
 
 #[derive(Serialize)]
-struct Left<'a> {
+struct Unexplained<'a> {
     share: f64,
     looks_like: Option<&'a str>,
 }
@@ -237,7 +241,7 @@ impl Serialize for GapResult {
         out.serialize_field("gap", &self.gap)?;
         out.serialize_field("open", &rows.filter_map(open).collect::<Vec<_>>())?;
         out.serialize_field("would_have_seen", &self.would_have_seen)?;
-        let left = Left {
+        let left = Unexplained {
             share: self.unexplained,
             looks_like: self.looks_like.as_deref(),
         };
@@ -277,7 +281,7 @@ impl Screening {
     /// [`Refused`] where a refitted value is none that a model may have.
     pub fn of<const N: usize>(
         prepared: &PreparedSession<'_, N>,
-        look: &Look<N>,
+        look: &FirstOrderScreening<N>,
         input: &SearchInput<'_>,
     ) -> Result<Self, Refused> {
         let plays = [(Version::Calibrated, look.in_trials.as_slice())];

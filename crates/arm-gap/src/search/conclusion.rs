@@ -5,14 +5,14 @@ use arm_core::effect::{Effect, Place};
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::session::ComparisonMode;
-use crate::fitting::fit::{Fitted, Precision};
+use crate::fitting::fit::{FittedHypothesis, Precision};
 use crate::fitting::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::hypothesis::{Hypothesis, Target};
 use crate::prepared_session::PreparedSession;
-use crate::search::set_apart::SetApart;
-use crate::selection::model_selection::NamedEffect;
+use crate::search::trial_specific_effects::TrialSpecificEffects;
+use crate::selection::model_selection::MissingEffect;
 use crate::selection::passive_base::BaseLaw;
-use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
+use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, SearchState, Settled};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 
@@ -20,11 +20,11 @@ use crate::trial_specific::component::TrialSpecific;
 #[derive(Clone, Debug)]
 pub struct Finding<const N: usize> {
     /// The model after refitting what was never exact.
-    pub calibrated: Fitted<N>,
+    pub calibrated: FittedHypothesis<N>,
     /// The model with the named effects.
-    pub amended: Fitted<N>,
+    pub amended: FittedHypothesis<N>,
     /// The named effects, those that explain most first.
-    pub named: Vec<NamedEffect>,
+    pub named: Vec<MissingEffect>,
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
     /// The calibrated and the amended model as they are in each trial; see [`crate::trial_specific::in_trial`].
@@ -36,7 +36,7 @@ pub struct Finding<const N: usize> {
     /// Lack of fit of the calibrated and of the amended model.
     pub lack: [LackOfFit; 2],
     /// The other candidates.
-    pub ruled: Vec<Ruled>,
+    pub detection_limits: Vec<DetectionLimit>,
     /// Misfit for each degree of freedom.
     pub scale: f64,
 }
@@ -44,7 +44,7 @@ pub struct Finding<const N: usize> {
 /// What is known of the amended model.
 struct Known<const N: usize> {
     /// The model.
-    amended: Fitted<N>,
+    amended: FittedHypothesis<N>,
     /// Its misfit with the noise that the search had.
     cost: f64,
     /// How well its numbers are known.
@@ -57,8 +57,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Selects the laws of the passive base, and measures what is left.
     pub(crate) fn concluded(
         &mut self,
-        (mut state, mut named): (SearchState<'a, N>, Vec<NamedEffect>),
-        mut apart: SetApart<N>,
+        (mut state, mut named): (SearchState<'a, N>, Vec<MissingEffect>),
+        mut apart: TrialSpecificEffects<N>,
         progress: Progress<'_>,
     ) -> Result<Finding<N>, GapError> {
         let base;
@@ -69,7 +69,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             current: mut amended,
             point,
             search_trace,
-            ruled,
+            detection_limits,
             scale,
             ..
         } = state;
@@ -110,7 +110,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             search_trace,
             precision,
             lack: [before, lack],
-            ruled,
+            detection_limits,
             scale,
         })
     }
@@ -119,10 +119,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// back the springs of both joints, and the effects that had replaced them become redundant.
     fn judged_with_base(
         &mut self,
-        (mut state, mut named): (SearchState<'a, N>, Vec<NamedEffect>),
+        (mut state, mut named): (SearchState<'a, N>, Vec<MissingEffect>),
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<(SearchState<'a, N>, Vec<NamedEffect>, Vec<BaseLaw<N>>), GapError> {
+    ) -> Result<(SearchState<'a, N>, Vec<MissingEffect>, Vec<BaseLaw<N>>), GapError> {
         progress("judging the passive base", 0.88)?;
         let found = (state.current.asked.clone(), self.dropped.clone());
         let settled = self.afresh((state.current, state.point));
@@ -157,7 +157,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn known(
         &mut self,
         (amended, point): Settled<'a, N>,
-        named: &mut Vec<NamedEffect>,
+        named: &mut Vec<MissingEffect>,
         (base, scale): (&[BaseLaw<N>], f64),
     ) -> Result<Known<N>, GapError> {
         let alone = self.precision(&point, &amended, scale)?;
@@ -182,7 +182,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             });
         };
         self.noise = before;
-        let Fitted {
+        let FittedHypothesis {
             mut hypothesis,
             mut asked,
             ..
@@ -202,8 +202,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Of slow noise, the differences of few repeats hold few independent samples, so its estimate from them is uncertain.
     fn weighed_by_what_is_left(
         &mut self,
-        (amended, point): (&Fitted<N>, LinearizationPoint<'a, N>),
-    ) -> Result<(Fitted<N>, Precision), GapError> {
+        (amended, point): (&FittedHypothesis<N>, LinearizationPoint<'a, N>),
+    ) -> Result<(FittedHypothesis<N>, Precision), GapError> {
         self.measure_noise_left(&point, amended)?;
         let again = self.settle(amended.hypothesis.clone(), amended.asked.clone());
         let (amended, point) = again.unwrap_or_else(|_| (amended.clone(), point));
@@ -214,8 +214,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// The calibrated and the amended model as they are in each trial, with what was set apart.
     fn in_every_trial(
         &self,
-        (calibrated, amended): (&mut Fitted<N>, &mut Fitted<N>),
-        apart: &mut SetApart<N>,
+        (calibrated, amended): (&mut FittedHypothesis<N>, &mut FittedHypothesis<N>),
+        apart: &mut TrialSpecificEffects<N>,
     ) -> Result<[Vec<Hypothesis<N>>; 2], GapError> {
         let rhythms = rhythms_of(&apart.trial_specific);
         let both = [&calibrated.hypothesis, &amended.hypothesis];
@@ -255,8 +255,8 @@ fn is_as_judged(found: &(Vec<Candidate>, Vec<bool>), now: &(Vec<Candidate>, Vec<
 /// What is known of the numbers, less what the laws may miss.
 fn widened<const N: usize>(
     alone: &Precision,
-    amended: &Fitted<N>,
-    named: &[NamedEffect],
+    amended: &FittedHypothesis<N>,
+    named: &[MissingEffect],
     (first, base): (usize, &[BaseLaw<N>]),
 ) -> Precision {
     let mut precision = alone.clone();
@@ -299,7 +299,7 @@ fn rhythms_of(trial_specific: &[TrialSpecific]) -> Vec<Effect<f64>> {
 ///
 /// * `explained` - what all of them explain, in units of twice the log-likelihood; infinite where nothing can be simulated without
 ///   them
-fn share_out(named: &mut [NamedEffect], explained: f64) {
+fn share_out(named: &mut [MissingEffect], explained: f64) {
     let all = match explained.is_finite() {
         true => explained,
         false => named.iter().map(|n| n.gain).sum(),

@@ -6,7 +6,7 @@ use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::Library;
 use crate::data::session::ComparisonMode;
-use crate::fitting::fit::Fitted;
+use crate::fitting::fit::FittedHypothesis;
 use crate::fitting::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::hypothesis::Hypothesis;
 use crate::prepared_session::PreparedSession;
@@ -16,9 +16,9 @@ use crate::trial_specific::tremor_detection::Line;
 
 /// Result of the screening; only the calibration was converged by simulation.
 #[derive(Clone, Debug)]
-pub struct Look<const N: usize> {
+pub struct FirstOrderScreening<const N: usize> {
     /// The model after refitting what was never exact.
-    pub calibrated: Fitted<N>,
+    pub calibrated: FittedHypothesis<N>,
     /// The same as it is in each trial; see [`crate::trial_specific::in_trial`].
     pub in_trials: Vec<Hypothesis<N>>,
     /// Its lack of fit.
@@ -47,7 +47,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     ///
     /// # Errors
     /// [`GapError`] where the model as given cannot be simulated or fitted.
-    pub fn look(&mut self, progress: Progress<'_>) -> Result<Look<N>, GapError> {
+    pub fn screen(&mut self, progress: Progress<'_>) -> Result<FirstOrderScreening<N>, GapError> {
         progress("calibrating", 0.1)?;
         let (mut calibrated, mut point) = self.calibrate()?;
         if !self.repeated {
@@ -93,7 +93,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             }
         }
         progress("done", 1.0)?;
-        Ok(Look {
+        Ok(FirstOrderScreening {
             in_trials: self.in_trials((&calibrated.hypothesis, &[])),
             calibrated,
             lack,

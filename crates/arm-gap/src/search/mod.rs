@@ -3,4 +3,4 @@
 pub mod conclusion;
 pub mod first_order_screening;
 pub mod rounds;
-pub mod set_apart;
+pub mod trial_specific_effects;

@@ -4,15 +4,15 @@ use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::Library;
 use crate::data::session::ComparisonMode;
-use crate::fitting::fit::Fitted;
+use crate::fitting::fit::FittedHypothesis;
 use crate::fitting::lack_of_fit::lack_of_fit;
 use crate::hypothesis::{Hypothesis, Target};
 use crate::prepared_session::PreparedSession;
 use crate::search::conclusion::Finding;
-use crate::search::set_apart::SetApart;
-use crate::selection::model_selection::{NamedEffect, mimicked_by_any};
+use crate::search::trial_specific_effects::TrialSpecificEffects;
+use crate::selection::model_selection::{MissingEffect, mimicked_by_any};
 use crate::selection::score_test::{Choice, ScoreTest};
-use crate::selection::search_state::{Progress, Ruled, SearchRound, SearchState, Settled};
+use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, SearchState, Settled};
 
 /// Most effects that are named.
 const MOST: usize = 6;
@@ -43,7 +43,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             settled = self.calibrate_base()?;
         }
         let led = self.session.comparison == ComparisonMode::Led;
-        let mut apart = SetApart {
+        let mut apart = TrialSpecificEffects {
             trial_specific: Vec::new(),
             periodic: None,
             measured: self.courses.clone(),
@@ -77,11 +77,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn or_as_it_was(
         &mut self,
         state: SearchState<'a, N>,
-        apart: &mut SetApart<N>,
+        apart: &mut TrialSpecificEffects<N>,
         go_on: impl FnOnce(
             &mut Self,
             SearchState<'a, N>,
-            &mut SetApart<N>,
+            &mut TrialSpecificEffects<N>,
         ) -> Result<SearchState<'a, N>, GapError>,
     ) -> Result<SearchState<'a, N>, GapError> {
         let before = (self.clone(), state.clone(), apart.clone());
@@ -102,8 +102,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         mut state: SearchState<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<(SearchState<'a, N>, Vec<NamedEffect>), GapError> {
-        let kinds = |f: &Fitted<N>| f.asked.iter().map(Candidate::kind).collect::<Vec<_>>();
+    ) -> Result<(SearchState<'a, N>, Vec<MissingEffect>), GapError> {
+        let kinds =
+            |f: &FittedHypothesis<N>| f.asked.iter().map(Candidate::kind).collect::<Vec<_>>();
         let mut outcomes = Vec::new();
         for turn in 1.. {
             let before = kinds(&state.current);
@@ -147,7 +148,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             calibrated,
             point,
             search_trace: Vec::new(),
-            ruled: Vec::new(),
+            detection_limits: Vec::new(),
             asked: 1.0,
             scale: 1.0,
             been: Vec::new(),
@@ -178,7 +179,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             state.asked = library.candidates.len() as f64;
             state.scale = score_test.scale;
-            state.ruled = self.ruled(&library, &score_test);
+            state.detection_limits = self.detection_limits(&library, &score_test);
             let room = MOST - state.current.asked.len();
             let asking = (&library, &score_test, room);
             let Some((settled, step)) = self.round(&state, asking) else {
@@ -419,9 +420,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    fn ruled(&self, library: &Library, score_test: &ScoreTest) -> Vec<Ruled> {
+    fn detection_limits(&self, library: &Library, score_test: &ScoreTest) -> Vec<DetectionLimit> {
         (0..score_test.len())
-            .map(|c| Ruled {
+            .map(|c| DetectionLimit {
                 effect: library.candidates[c].effect,
                 free: library.candidates[c].free.clone(),
                 gain: score_test.evaluate(&[c]).map_or(0.0, |choice| choice.gain)
@@ -436,7 +437,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 /// What came of the choices that were converged by simulation.
 struct Converged<const N: usize> {
     /// Those worth their price: their worth less the price of their shapes, and how they fit.
-    worthy: Vec<(f64, Fitted<N>)>,
+    worthy: Vec<(f64, FittedHypothesis<N>)>,
     /// All with what they gained.
     tried: Vec<(Vec<Candidate>, f64)>,
     /// Their members, also of those that cannot be followed: none is converged twice.

@@ -5,7 +5,7 @@ use arm_core::effect::Kind;
 use crate::GapError;
 use crate::candidates::refined_shapes::CREEP;
 use crate::data::session::ComparisonMode;
-use crate::fitting::fit::Fitted;
+use crate::fitting::fit::FittedHypothesis;
 use crate::hypothesis::{Hypothesis, Target};
 use crate::prepared_session::PreparedSession;
 use crate::selection::search_state::Settled;
@@ -59,7 +59,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// * `scale` - as in [`SearchState`](crate::selection::search_state::SearchState)
     pub(crate) fn with_one_dry_law(
         &self,
-        current: &Fitted<N>,
+        current: &FittedHypothesis<N>,
         scale: f64,
     ) -> Option<Settled<'a, N>> {
         let base = self.dry_base_laws();
@@ -97,7 +97,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The hypothesis with the smoothing of each law of the base that costs least; where much is left, with all numbers fitted anew, as they
     /// may have been bent by the smoothing that they were fitted with.
-    fn smoothed(&self, fitted: &Fitted<N>, laws: &[Target]) -> Fitted<N> {
+    fn smoothed(&self, fitted: &FittedHypothesis<N>, laws: &[Target]) -> FittedHypothesis<N> {
         // What cannot be simulated is not chosen.
         let simulated = |hypothesis: Hypothesis<N>| {
             let asked = fitted.asked.clone();
@@ -118,7 +118,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// The same with a named law that sticks, where that costs less once its other numbers are fitted anew.
-    fn sticking(&self, fitted: Fitted<N>, slot: usize) -> Fitted<N> {
+    fn sticking(&self, fitted: FittedHypothesis<N>, slot: usize) -> FittedHypothesis<N> {
         let mut sticking = fitted.clone();
         let named = &mut sticking.hypothesis.named[slot];
         if let Some(smoothing) = named.kind.smoothed_by() {
@@ -138,10 +138,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 /// * `laws`, `speeds` - where each law has its smoothing, and the ones that are tried, ascending \[rad/s\]
 /// * `fitted` - the fit of a hypothesis, `None` where it cannot be simulated
 fn cheapest<const N: usize>(
-    mut best: Fitted<N>,
+    mut best: FittedHypothesis<N>,
     (laws, speeds): (&[Target], &[f64]),
-    fitted: impl Fn(Hypothesis<N>) -> Option<Fitted<N>>,
-) -> Fitted<N> {
+    fitted: impl Fn(Hypothesis<N>) -> Option<FittedHypothesis<N>>,
+) -> FittedHypothesis<N> {
     // The mode of one joint at rest changes the motion of others: a choice is tested again when another one has changed since.
     let mut since_change = 0;
     for &law in laws.iter().cycle().take(SWEEPS * laws.len()) {
@@ -174,12 +174,12 @@ fn next_smoothing(speeds: &[f64], present: f64, upwards: bool) -> Option<f64> {
 }
 
 /// Whether another fit costs less by more than nothing.
-fn is_cheaper<const N: usize>(other: &Fitted<N>, present: &Fitted<N>) -> bool {
+fn is_cheaper<const N: usize>(other: &FittedHypothesis<N>, present: &FittedHypothesis<N>) -> bool {
     other.cost + other.enough() < present.cost
 }
 
 /// The places of named dry laws that creep at rest.
-fn creeping<const N: usize>(fitted: &Fitted<N>) -> Vec<usize> {
+fn creeping<const N: usize>(fitted: &FittedHypothesis<N>) -> Vec<usize> {
     let named = fitted.hypothesis.named.iter().enumerate();
     named
         .filter(|(_, effect)| effect.kind.smoothed_by().is_some() && !effect.is_dry())

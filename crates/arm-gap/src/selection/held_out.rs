@@ -2,7 +2,7 @@
 
 /// What a model leaves of one trial.
 #[derive(Clone, Debug)]
-pub struct Left {
+pub struct TrialResidual {
     /// The movement; repeats share it.
     pub group: usize,
     /// Whether it is a test trial.
@@ -17,7 +17,7 @@ pub struct Left {
 
 /// The gap of one channel on the test trials.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gap {
+pub struct HeldOutGap {
     /// Root mean square of what is left; `None` where no test trial can be simulated.
     pub size: Option<f64>,
     /// What repeats of one movement differ by; `None` without repeats.
@@ -66,7 +66,7 @@ struct Piece {
 /// freedom of each (Satterthwaite 1946). A gap is open where their ratio, less what is tolerated, exceeds the 0.999 quantile of Fisher's
 /// distribution (cube-root approximation of Wilson and Hilferty 1931, Paulson 1942). Few pieces decide little at that level: a gap that is
 /// clear in the table, half as large again as its floor and more than its standard deviation above it, is open as well.
-pub fn held_out(trials: &[Left]) -> Vec<Gap> {
+pub fn held_out(trials: &[TrialResidual]) -> Vec<HeldOutGap> {
     let channels = trials
         .iter()
         .find_map(|t| t.residuals.as_ref().map(Vec::len));
@@ -75,7 +75,7 @@ pub fn held_out(trials: &[Left]) -> Vec<Gap> {
         .collect()
 }
 
-fn channel(trials: &[Left], c: usize) -> Gap {
+fn channel(trials: &[TrialResidual], c: usize) -> HeldOutGap {
     let tests: Vec<usize> = (0..trials.len()).filter(|&t| trials[t].test).collect();
     let left: Vec<(usize, Vec<Piece>)> = tests
         .iter()
@@ -90,7 +90,7 @@ fn channel(trials: &[Left], c: usize) -> Gap {
         .into_iter()
         .find_map(|test| floor(trials, c, test))
     else {
-        return Gap {
+        return HeldOutGap {
             size,
             floor: None,
             floor_std: None,
@@ -110,7 +110,7 @@ fn channel(trials: &[Left], c: usize) -> Gap {
     // Pieces of the test trials scatter as those of the deviations do.
     let own = freedom.each * count as f64;
     let relative = 0.5 / freedom.all + 0.5 / own.max(1.0);
-    let mut gap = Gap {
+    let mut gap = HeldOutGap {
         size,
         floor: Some(floor),
         floor_std: Some(floor * libm::sqrt(relative)),
@@ -138,14 +138,14 @@ struct Freedom {
 }
 
 /// What trials of a role differ by from the mean of their repeats; `None` where none has a repeat.
-fn floor(trials: &[Left], c: usize, test: bool) -> Option<(f64, Freedom)> {
+fn floor(trials: &[TrialResidual], c: usize, test: bool) -> Option<(f64, Freedom)> {
     let mut all: Vec<Piece> = Vec::new();
     let mut independent = 0.0;
     let mut groups: Vec<usize> = trials.iter().map(|t| t.group).collect();
     groups.sort_unstable();
     groups.dedup();
     for group in groups {
-        let members: Vec<&Left> = trials
+        let members: Vec<&TrialResidual> = trials
             .iter()
             .filter(|t| t.group == group && t.residuals.is_some())
             .collect();
@@ -154,7 +154,7 @@ fn floor(trials: &[Left], c: usize, test: bool) -> Option<(f64, Freedom)> {
         }
         let n = members.len() as f64;
         let length = members.iter().map(|t| t.counted.len()).max().unwrap_or(0);
-        let of = |t: &Left, i: usize| t.residuals.as_ref().map_or(0.0, |r| r[c][i]);
+        let of = |t: &TrialResidual, i: usize| t.residuals.as_ref().map_or(0.0, |r| r[c][i]);
         // At every sample those that last so long.
         let present = |i: usize| {
             let lasting = members
@@ -170,7 +170,7 @@ fn floor(trials: &[Left], c: usize, test: bool) -> Option<(f64, Freedom)> {
                     .then(|| (values.iter().sum::<f64>() / n, libm::sqrt(n / (n - 1.0))))
             })
             .collect();
-        let used: Vec<&&Left> = members.iter().filter(|t| t.test == test).collect();
+        let used: Vec<&&TrialResidual> = members.iter().filter(|t| t.test == test).collect();
         let mut made = 0;
         for member in &used {
             let deviation: Vec<(usize, f64)> = (0..member.counted.len())
@@ -204,7 +204,7 @@ fn floor(trials: &[Left], c: usize, test: bool) -> Option<(f64, Freedom)> {
     (square > 0.0).then(|| (libm::sqrt(square), freedom))
 }
 
-fn counted(trial: &Left, residual: &[f64]) -> Vec<(usize, f64)> {
+fn counted(trial: &TrialResidual, residual: &[f64]) -> Vec<(usize, f64)> {
     let all = std::iter::zip(residual, &trial.counted).enumerate();
     all.filter(|(_, (_, counted))| **counted)
         .map(|(i, (v, _))| (i, *v))
@@ -284,14 +284,14 @@ mod tests {
         (0..count).map(next).collect()
     }
 
-    fn trials(seed: u64, bump: f64) -> Vec<Left> {
+    fn trials(seed: u64, bump: f64) -> Vec<TrialResidual> {
         (0..6)
             .map(|t| {
                 let mut residual = noise(seed * 100 + t, 600);
                 for v in &mut residual[200..300] {
                     *v += bump;
                 }
-                Left {
+                TrialResidual {
                     group: t as usize / 3,
                     test: t % 3 == 2,
                     rate: 50.0,

@@ -16,7 +16,7 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
 
 /// A named effect, and others that would do instead.
-pub struct Contest<'a, const N: usize> {
+pub struct Discrimination<'a, const N: usize> {
     prepared: PreparedSession<'a, N>,
     /// The session with the named effect.
     named: Hypothesis<N>,
@@ -33,7 +33,7 @@ struct Rival<const N: usize> {
     coordinates: Vec<Coordinate>,
 }
 
-impl<'a, const N: usize> Contest<'a, N> {
+impl<'a, const N: usize> Discrimination<'a, N> {
     /// Between a named effect and its rivals, on the fit trials of a session.
     ///
     /// * `prepared` - its session has everything as known effects but the named one

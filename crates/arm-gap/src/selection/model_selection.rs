@@ -6,8 +6,8 @@ use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::candidates::library::{Library, Twin};
-use crate::fitting::fit::Fitted;
+use crate::candidates::library::{Library, LibraryEntry};
+use crate::fitting::fit::FittedHypothesis;
 use crate::fitting::lack_of_fit::lack_of_fit;
 use crate::hypothesis::Hypothesis;
 use crate::prepared_session::PreparedSession;
@@ -69,7 +69,7 @@ pub(crate) fn mimicked_by_any(effect: &Effect<f64>, named: &[Candidate], explain
 
 /// One effect that was named.
 #[derive(Clone, Debug)]
-pub struct NamedEffect {
+pub struct MissingEffect {
     /// Its place in the hypothesis.
     pub slot: usize,
     /// Probability of such a gain by chance, with all candidates that were tested.
@@ -98,17 +98,17 @@ pub struct FittedAlternative {
 /// An alternative, fitted.
 pub(crate) struct Rival<const N: usize> {
     pub alternative: FittedAlternative,
-    pub fitted: Fitted<N>,
+    pub fitted: FittedHypothesis<N>,
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// A fitted hypothesis without the effect at a place, fitted again; of infinite cost where nothing goes without it.
     fn without(
         &self,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
         slot: usize,
         point: &LinearizationPoint<N>,
-    ) -> Result<Fitted<N>, GapError> {
+    ) -> Result<FittedHypothesis<N>, GapError> {
         let mut hypothesis: Hypothesis<N> = fitted.hypothesis.clone();
         let mut asked = fitted.asked.clone();
         hypothesis.named.remove(slot);
@@ -133,7 +133,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         // Or too far away to be followed.
         let settled = self.settle(hypothesis.clone(), asked.clone());
         Ok(settled.map_or_else(
-            |_| Fitted {
+            |_| FittedHypothesis {
                 hypothesis,
                 asked,
                 cost: f64::INFINITY,
@@ -147,9 +147,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// A fitted hypothesis without each of its effects, whose gains are set.
     fn without_each(
         &self,
-        fitted: &mut Fitted<N>,
+        fitted: &mut FittedHypothesis<N>,
         point: &LinearizationPoint<N>,
-    ) -> Result<Vec<Fitted<N>>, GapError> {
+    ) -> Result<Vec<FittedHypothesis<N>>, GapError> {
         let each = self.parallel(fitted.asked.len(), |slot| self.without(fitted, slot, point));
         let each = each.into_iter().collect::<Result<Vec<_>, _>>()?;
         for (candidate, less) in std::iter::zip(&mut fitted.asked, &each) {
@@ -164,7 +164,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// * `base` - laws of the base, and what each gains
     pub(super) fn mimicked_beside(
         &self,
-        (fitted, slot, less): (&Fitted<N>, usize, &Fitted<N>),
+        (fitted, slot, less): (&FittedHypothesis<N>, usize, &FittedHypothesis<N>),
         base: &[(Effect<f64>, f64)],
         point: &LinearizationPoint<N>,
     ) -> f64 {
@@ -188,7 +188,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn pruned(
         &self,
         (mut fitted, mut point): Settled<'a, N>,
-        calibrated: &Fitted<N>,
+        calibrated: &FittedHypothesis<N>,
         scale: f64,
     ) -> Result<Settled<'a, N>, GapError> {
         let floor = match self.repeated {
@@ -196,7 +196,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             false => FLOOR_UNREPEATED,
         };
         while !fitted.asked.is_empty() {
-            let mut weakest: Option<(f64, Fitted<N>)> = None;
+            let mut weakest: Option<(f64, FittedHypothesis<N>)> = None;
             let left = OF_WHAT_IS_LEFT * lack_of_fit(self, &point, &fitted).certain();
             let floor = f64::max(floor * (calibrated.cost - fitted.cost), left);
             let base = self.gains_of_base(&point, &fitted)?;
@@ -244,10 +244,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn judged(
         &self,
         (mut fitted, mut point): Settled<'a, N>,
-        calibrated: &Fitted<N>,
+        calibrated: &FittedHypothesis<N>,
         (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
         progress: Progress<'_>,
-    ) -> Result<(Fitted<N>, LinearizationPoint<'a, N>, Vec<NamedEffect>), GapError> {
+    ) -> Result<
+        (
+            FittedHypothesis<N>,
+            LinearizationPoint<'a, N>,
+            Vec<MissingEffect>,
+        ),
+        GapError,
+    > {
         let mut exchanges = 0;
         'again: loop {
             let mut named = Vec::new();
@@ -255,7 +262,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 0 => None,
                 _ => Some(Library::build(self, &point, periodic)?),
             };
-            let twins = match &mut library {
+            let entries = match &mut library {
                 Some(library) => {
                     let effects = fitted.hypothesis.named.iter().copied();
                     let named: Vec<_> = fitted.asked.iter().cloned().zip(effects).collect();
@@ -264,7 +271,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 None => Vec::new(),
             };
             let without = self.without_each(&mut fitted, &point)?;
-            for (slot, (twin, less)) in std::iter::zip(&twins, &without).enumerate() {
+            for (slot, (entry, less)) in std::iter::zip(&entries, &without).enumerate() {
                 progress(
                     "comparing alternatives",
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
@@ -273,7 +280,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 let rivals = match &library {
                     // Where the run cannot be followed without it, its gain is unknown.
                     Some(library) if less.cost.is_finite() => {
-                        let place = (slot, less, twin.as_ref());
+                        let place = (slot, less, entry.as_ref());
                         let found = self.rivals(&fitted, place, (&point, library), scale);
                         found.unwrap_or_default()
                     }
@@ -292,7 +299,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 });
                 if let Some(better) = better {
                     exchanges += 1;
-                    let Fitted {
+                    let FittedHypothesis {
                         hypothesis, asked, ..
                     } = better.fitted.clone();
                     // A solution that can be followed but not simulated is refused.
@@ -304,7 +311,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 }
                 let candidate = &fitted.asked[slot];
                 let chance = chi_square_tail(gain / scale, candidate.width());
-                named.push(NamedEffect {
+                named.push(MissingEffect {
                     slot,
                     p_value: (asked * chance).min(1.0),
                     gain: gain / scale,
@@ -375,8 +382,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// else changes with the exchange.
     pub(crate) fn rivals(
         &self,
-        fitted: &Fitted<N>,
-        (slot, less, twin): (usize, &Fitted<N>, Option<&Twin>),
+        fitted: &FittedHypothesis<N>,
+        (slot, less, entry): (usize, &FittedHypothesis<N>, Option<&LibraryEntry>),
         (point, library): (&LinearizationPoint<N>, &Library),
         scale: f64,
     ) -> Result<Vec<Rival<N>>, GapError> {
@@ -392,21 +399,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             .min(less.cost - fitted.cost);
         let mut hypothesis = fitted.hypothesis.clone();
         hypothesis.named.remove(slot);
-        let as_fitted = Fitted {
+        let as_fitted = FittedHypothesis {
             hypothesis,
             residuals: fitted.residuals.clone(),
             ..less.clone()
         };
-        let in_place = twin.and_then(|twin| {
+        let in_place = entry.and_then(|entry| {
             let score_test = ScoreTest::new(self, &as_fitted, point, library).ok()?;
-            Some((score_test, twin))
+            Some((score_test, entry))
         });
-        let mut singles: Vec<(f64, Choice, (&ScoreTest, &Fitted<N>))> = Vec::new();
+        let mut singles: Vec<(f64, Choice, (&ScoreTest, &FittedHypothesis<N>))> = Vec::new();
         for &c in &others {
             let choice = refitted.evaluate(&[c]);
             let choice = choice.map(|choice| (choice.gain / gain, choice, (&refitted, less)));
-            let stand_in = in_place.as_ref().and_then(|(score_test, twin)| {
-                let (part, choice) = score_test.stand_in(c, twin)?;
+            let stand_in = in_place.as_ref().and_then(|(score_test, entry)| {
+                let (part, choice) = score_test.stand_in(c, entry)?;
                 Some((part, choice, (score_test, &as_fitted)))
             });
             let both = choice.into_iter().chain(stand_in);
@@ -417,7 +424,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         singles.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best of each effect.
         let candidate = |choice: &Choice| &library.candidates[choice.members[0]];
-        let mut best: Vec<&(f64, Choice, (&ScoreTest, &Fitted<N>))> = Vec::new();
+        let mut best: Vec<&(f64, Choice, (&ScoreTest, &FittedHypothesis<N>))> = Vec::new();
         for single in &singles {
             let effect = &candidate(&single.1).effect;
             if best.len() < RIVALS && !best.iter().any(|b| candidate(&b.1).is_same_effect(effect)) {
@@ -434,7 +441,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let effect = rival.hypothesis.named.last().copied();
             let effect = effect.filter(|effect| !asked.is_plainer(effect))?;
             let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
-            let likeness = twin.map_or(0.0, |t| score_test.likeness(t.place, member));
+            let likeness = entry.map_or(0.0, |t| score_test.likeness(t.place, member));
             Some(Rival {
                 alternative: FittedAlternative {
                     candidate: asked,
@@ -462,15 +469,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// The first-order coefficients are halved until they lower the cost: effects that are strong are not linear.
     pub(crate) fn attempt(
         &self,
-        current: &Fitted<N>,
+        current: &FittedHypothesis<N>,
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
         point: &LinearizationPoint<N>,
-    ) -> Option<Fitted<N>> {
+    ) -> Option<FittedHypothesis<N>> {
         /// Shares of the first-order coefficients that are tried: the response to a strong effect is smaller than to first order.
         const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
         let mut all = current.asked.clone();
         all.extend_from_slice(asked);
-        let mut best: Option<Fitted<N>> = None;
+        let mut best: Option<FittedHypothesis<N>> = None;
         for share in SHARES {
             let mut hypothesis = current.hypothesis.clone();
             for (candidate, own) in std::iter::zip(asked, coefficients) {

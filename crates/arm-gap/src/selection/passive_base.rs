@@ -8,14 +8,14 @@ use arm_numerics::statistics::distributions::chi_square_tail;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::candidates::library::{Library, Twin};
+use crate::candidates::library::{Library, LibraryEntry};
 use crate::data::passive_law::Passive;
 use crate::data::session::Session;
-use crate::fitting::fit::{Fitted, Precision};
+use crate::fitting::fit::{FittedHypothesis, Precision};
 use crate::fitting::lack_of_fit::{LackOfFit, lack_of_fit};
 use crate::hypothesis::{Hypothesis, Target};
 use crate::prepared_session::PreparedSession;
-use crate::selection::model_selection::{FittedAlternative, NamedEffect, TIE};
+use crate::selection::model_selection::{FittedAlternative, MissingEffect, TIE};
 use crate::selection::passive_base_evidence::{ODDS, STAYS, Term, crossed_joints, least_of};
 use crate::selection::search_state::Settled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -37,9 +37,9 @@ pub(crate) struct BaseLaw<const N: usize> {
     /// What does as well in its joint.
     pub alternatives: Vec<FittedAlternative>,
     /// The hypothesis in which something else takes its place, where that explains more.
-    better: Option<Fitted<N>>,
+    better: Option<FittedHypothesis<N>>,
     /// What came clearly nearer to the data with something else in its place, whatever that is.
-    nearer: Option<Fitted<N>>,
+    nearer: Option<FittedHypothesis<N>>,
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
@@ -47,7 +47,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn base_terms(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
     ) -> Result<Vec<Term>, GapError> {
         let mut precision = self.precision(point, fitted, 1.0)?;
         if precision.sd.iter().all(|sd| sd.is_infinite()) {
@@ -74,7 +74,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn gains_of_base(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
     ) -> Result<Vec<(Effect<f64>, f64)>, GapError> {
         if self.session.base.is_empty() {
             return Ok(Vec::new());
@@ -89,7 +89,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn gain_of_dry_law(
         &self,
         point: &LinearizationPoint<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
         joint: usize,
     ) -> Option<(Effect<f64>, f64)> {
         let first = self.session.effects.len();
@@ -149,7 +149,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// where none comes back and nothing is gained.
     pub(crate) fn with_base_revived(
         &mut self,
-        current: &Fitted<N>,
+        current: &FittedHypothesis<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
         let before = self.dropped.clone();
         let is_bent = current.leaves_much();
@@ -198,7 +198,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// spring of that one. `None` where nothing is.
     pub(crate) fn with_base_instead(
         &mut self,
-        current: &Fitted<N>,
+        current: &FittedHypothesis<N>,
         point: &LinearizationPoint<N>,
     ) -> Result<Option<Settled<'a, N>>, GapError> {
         if current.asked.is_empty() || !self.dropped.contains(&true) {
@@ -307,7 +307,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// then not the law was wrong, but the fit had stopped short.
     fn fitted_from_nearer(
         &self,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
         laws: &[BaseLaw<N>],
     ) -> Option<Settled<'a, N>> {
         let first = self.session.effects.len();
@@ -358,7 +358,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .iter()
                 .map(|&l| (laws[l].question.clone(), effect(l)))
                 .collect();
-            let twins = library.add_named(self, point, &named)?;
+            let entries = library.add_named(self, point, &named)?;
             let judged = self.parallel(own.len(), |i| {
                 let mut law = laws[own[i]].clone();
                 let known = first + law.base;
@@ -370,7 +370,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     .push(fitted.hypothesis.known[known]);
                 as_named.hypothesis.known[known].parameters[0] = 0.0;
                 as_named.asked.push(law.question.clone());
-                let as_named = (&as_named, twins[i].as_ref());
+                let as_named = (&as_named, entries[i].as_ref());
                 self.judge_base_law(&mut law, as_named, (&held, &library), scale);
                 law
             });
@@ -385,7 +385,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn judge_base_law(
         &self,
         law: &mut BaseLaw<N>,
-        (fitted, twin): (&Fitted<N>, Option<&Twin>),
+        (fitted, entry): (&FittedHypothesis<N>, Option<&LibraryEntry>),
         (point, library): (&LinearizationPoint<'a, N>, &Library),
         scale: f64,
     ) {
@@ -396,7 +396,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let Ok(less) = self.fit(point, less, fitted.asked[..slot].to_vec()) else {
             return;
         };
-        let place = (slot, &less, twin);
+        let place = (slot, &less, entry);
         let rivals = self.rivals(fitted, place, (point, library), scale);
         let mut rivals = rivals.unwrap_or_default();
         let all = rivals.iter().map(|r| &r.fitted);
@@ -424,9 +424,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn name(
         &self,
         law: BaseLaw<N>,
-        amended: &mut Fitted<N>,
+        amended: &mut FittedHypothesis<N>,
         precision: &mut Precision,
-    ) -> NamedEffect {
+    ) -> MissingEffect {
         let (known, slot) = (self.session.effects.len() + law.base, amended.asked.len());
         for c in &mut precision.coordinates {
             if let Target::Known(e, p) = c.target
@@ -439,7 +439,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         amended.hypothesis.named.push(effect);
         let width = law.question.width();
         amended.asked.push(law.question);
-        NamedEffect {
+        MissingEffect {
             slot,
             p_value: chi_square_tail(law.gain, width),
             gain: law.gain,
@@ -471,7 +471,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Where it cannot be simulated the model as given replaces it, and its residual is the gain of the laws of the base.
     ///
     /// * `gained` - what each of them gains, in units of twice the log-likelihood
-    pub(crate) fn rigid(&self, gained: &[f64]) -> Option<(Fitted<N>, LackOfFit)> {
+    pub(crate) fn rigid(&self, gained: &[f64]) -> Option<(FittedHypothesis<N>, LackOfFit)> {
         if gained.is_empty() {
             return None;
         }
@@ -499,7 +499,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 z: f64::INFINITY,
                 excess: gained.iter().sum(),
             };
-            let fitted = Fitted {
+            let fitted = FittedHypothesis {
                 hypothesis,
                 asked: Vec::new(),
                 cost: f64::INFINITY,

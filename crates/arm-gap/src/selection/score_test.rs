@@ -5,9 +5,9 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::GapError;
 use crate::candidates::candidate::{Candidate, price};
-use crate::candidates::library::{Library, Twin};
-use crate::fitting::fit::{Fitted, regularise};
-use crate::fitting::score_variance::{spread, told, unlike};
+use crate::candidates::library::{Library, LibraryEntry};
+use crate::fitting::fit::{FittedHypothesis, regularise};
+use crate::fitting::score_variance::{spread, trial_scores, unlike};
 use crate::hypothesis::{Coordinate, Hypothesis, priors};
 use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -58,7 +58,7 @@ impl ScoreTest {
     /// [`GapError`] where the fitted hypothesis cannot be simulated or is singular.
     pub fn new<const N: usize>(
         prepared: &PreparedSession<N>,
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
         point: &LinearizationPoint<N>,
         library: &Library,
     ) -> Result<Self, GapError> {
@@ -124,8 +124,8 @@ impl ScoreTest {
                 (i, -sum.fold(0.0, |s, (c, b)| s + b * share[(a, *c)]))
             });
             let weights: Vec<(usize, f64)> = own.chain(others).collect();
-            let told = told(&clusters, &weights);
-            Some((spread(&told), unlike(&told)))
+            let scores = trial_scores(&clusters, &weights);
+            Some((spread(&scores), unlike(&scores)))
         });
         for (index, found) in scattered.into_iter().enumerate() {
             if let Some(found) = found {
@@ -159,8 +159,8 @@ impl ScoreTest {
     }
 
     /// How well a candidate replaces a named effect: the share of its response, and the coefficients.
-    pub fn stand_in(&self, candidate: usize, twin: &Twin) -> Option<(f64, Choice)> {
-        let shown = self.columns[twin.place].clone().zip(&twin.sizes);
+    pub fn stand_in(&self, candidate: usize, entry: &LibraryEntry) -> Option<(f64, Choice)> {
+        let shown = self.columns[entry.place].clone().zip(&entry.sizes);
         let mut score = vec![0.0; self.score.len()];
         let mut all = 0.0;
         for (column, size) in shown.clone() {

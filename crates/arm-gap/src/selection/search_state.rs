@@ -4,7 +4,7 @@ use arm_core::effect::Effect;
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
-use crate::fitting::fit::Fitted;
+use crate::fitting::fit::FittedHypothesis;
 use crate::fitting::lack_of_fit::LackOfFit;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
@@ -21,7 +21,7 @@ pub struct SearchRound {
 
 /// A candidate that was not named: what it would still explain, and the smallest size that would have been named.
 #[derive(Clone, Debug)]
-pub struct Ruled {
+pub struct DetectionLimit {
     /// The effect.
     pub effect: Effect<f64>,
     /// Its free parameters.
@@ -38,18 +38,18 @@ pub struct Ruled {
 pub type Progress<'a> = &'a (dyn Fn(&str, f64) -> Result<(), GapError> + Sync);
 
 /// A fitted hypothesis with the simulation that it was followed from.
-pub(crate) type Settled<'a, const N: usize> = (Fitted<N>, LinearizationPoint<'a, N>);
+pub(crate) type Settled<'a, const N: usize> = (FittedHypothesis<N>, LinearizationPoint<'a, N>);
 
 /// What was found of effects that last.
 #[derive(Clone)]
 pub(crate) struct SearchState<'a, const N: usize> {
-    pub calibrated: Fitted<N>,
+    pub calibrated: FittedHypothesis<N>,
     /// What the calibrated model leaves, at the same samples and with the same noise.
     pub before: LackOfFit,
-    pub current: Fitted<N>,
+    pub current: FittedHypothesis<N>,
     pub point: LinearizationPoint<'a, N>,
     pub search_trace: Vec<SearchRound>,
-    pub ruled: Vec<Ruled>,
+    pub detection_limits: Vec<DetectionLimit>,
     /// Number of candidates.
     pub asked: f64,
     pub scale: f64,
@@ -69,7 +69,7 @@ impl<const N: usize> SearchState<'_, N> {
 
     /// Whether it has been here before and was no worse off: from here it would go round in a circle.
     pub fn is_back(&mut self, dry: [bool; N]) -> bool {
-        let Fitted { asked, cost, .. } = &self.current;
+        let FittedHypothesis { asked, cost, .. } = &self.current;
         let enough = self.current.enough();
         let same = |other: &[Candidate]| {
             other.len() == asked.len()

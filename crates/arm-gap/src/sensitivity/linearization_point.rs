@@ -16,7 +16,7 @@ use crate::linearization::linear_response::{Change, Response};
 use crate::linearization::linearized_run::{ASTRAY, Linear};
 use crate::linearization::origin::Origin;
 use crate::prepared_session::{PreparedSession, SimulatedRuns};
-use crate::sensitivity::rows::Rows;
+use crate::sensitivity::rows::WhitenedRows;
 
 /// A hypothesis that was simulated.
 #[derive(Clone)]
@@ -35,8 +35,8 @@ pub struct LinearizationPoint<'a, const N: usize> {
     pub coordinates: Vec<Coordinate>,
     /// Responses to what differs from trial to trial.
     pub own: Vec<Response>,
-    /// Rows of the nuisances.
-    pub rows: Rows,
+    /// Whitened rows of the nuisances.
+    pub rows: WhitenedRows,
 }
 
 impl<const N: usize> LinearizationPoint<'_, N> {
@@ -105,7 +105,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             residuals: Vec::new(),
             coordinates,
             own: Vec::new(),
-            rows: Rows::default(),
+            rows: WhitenedRows::default(),
         };
         point.shown = self.shown_on(&point, &self.references)?;
         let shown = self.shown_on(&point, &self.fitted)?;
@@ -116,7 +116,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         all.extend(self.session.by_trial());
         let mut responses = self.responses_to(&point, &all)?;
         point.own = responses.split_off(point.coordinates.len());
-        point.rows = Rows::new(self, &responses, &point.own);
+        point.rows = WhitenedRows::new(self, &responses, &point.own);
         Ok(point)
     }
 

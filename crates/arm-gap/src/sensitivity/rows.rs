@@ -41,13 +41,13 @@ pub struct Columns(Vec<(Vec<Vec<f64>>, Matrix)>);
 
 /// Whitened columns of the fitted trials.
 #[derive(Clone, Default)]
-pub struct Rows {
+pub struct WhitenedRows {
     classes: Vec<Class>,
     /// Standard deviations of what belongs to each trial alone.
     own: Vec<f64>,
 }
 
-impl Rows {
+impl WhitenedRows {
     /// Whitens the responses to what is always refitted.
     ///
     /// * `own` - responses to what differs from trial to trial
@@ -110,7 +110,7 @@ impl Rows {
         }
     }
 
-    /// Whitens responses to further unknowns, for [`Rows::clusters_beside`].
+    /// Whitens responses to further unknowns, for [`WhitenedRows::clusters_beside`].
     pub fn columns<const N: usize>(
         &self,
         prepared: &PreparedSession<N>,
@@ -234,11 +234,11 @@ impl Class {
         valid_segments: ValidSegments,
         member: usize,
     ) -> Self {
-        let told = valid_segments.rows_per_channel(prepared.session.channels());
+        let compared = valid_segments.rows_per_channel(prepared.session.channels());
         Self {
             group,
             reference,
-            rows: told.iter().sum(),
+            rows: compared.iter().sum(),
             whitening: prepared.noise.whitening(&valid_segments),
             valid_segments,
             members: vec![member],

@@ -28,10 +28,10 @@ const CONVERGED: f64 = 1e-3;
 const SLOWLY: i32 = 3;
 
 /// What a hypothesis leaves above the band, in sizes of each channel: one row of numbers for one trial of each movement.
-type Left = Vec<f64>;
+type RingingResidual = Vec<f64>;
 
 /// What of the ringing is compared.
-struct Heard {
+struct ComparedRinging {
     trials: Vec<usize>,
     /// Frequencies of what swings besides, which would pass for ringing \[Hz\].
     swings: Vec<f64>,
@@ -42,7 +42,7 @@ struct Heard {
 /// Where a contact is refitted to, and what it then leaves.
 struct Tuned<const N: usize> {
     hypothesis: Hypothesis<N>,
-    left: Left,
+    left: RingingResidual,
 }
 
 impl<const N: usize> PreparedSession<'_, N> {
@@ -59,24 +59,24 @@ impl<const N: usize> PreparedSession<'_, N> {
             return None;
         }
         let swing = |r: &Effect<f64>| r.parameters[shapes_of(r.kind)[0]];
-        let mut heard = Heard {
+        let mut compared = ComparedRinging {
             trials: self.one_of_each(),
             swings: rhythms.iter().map(swing).collect(),
             sizes: vec![1.0; self.session.channels()],
         };
-        let above = self.above(&heard, start)?;
-        heard.sizes = sizes(&above);
-        let before = heard.row(&above);
+        let above = self.above(&compared, start)?;
+        compared.sizes = sizes(&above);
+        let before = compared.row(&above);
         let given = Hypothesis {
             contact: self.session.given().contact,
             ..start.clone()
         };
-        let from = |hypothesis: &Hypothesis<N>, left: Left| {
+        let from = |hypothesis: &Hypothesis<N>, left: RingingResidual| {
             let start = Tuned {
                 hypothesis: hypothesis.clone(),
                 left,
             };
-            self.tuned_from(start, &heard)
+            self.tuned_from(start, &compared)
         };
         let mut best = from(start, before.clone());
         let is_far = |c: &Coordinate| {
@@ -85,7 +85,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         };
         let far = self.session.nuisances().iter().any(is_far);
         if far
-            && let Some(left) = self.left_ringing(&heard, &given)
+            && let Some(left) = self.left_ringing(&compared, &given)
             && let Some(other) = from(&given, left)
         {
             let least = best.as_ref().map_or(&before, |b| &b.left);
@@ -97,7 +97,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     }
 
     /// Gauss and Newton's method from a start, whose contact is the prior mean; `None` where a step cannot be simulated.
-    fn tuned_from(&self, mut best: Tuned<N>, heard: &Heard) -> Option<Tuned<N>> {
+    fn tuned_from(&self, mut best: Tuned<N>, compared: &ComparedRinging) -> Option<Tuned<N>> {
         let coordinates: Vec<Coordinate> = self
             .session
             .nuisances()
@@ -108,8 +108,10 @@ impl<const N: usize> PreparedSession<'_, N> {
                 ..c
             })
             .collect();
-        let left = |h: &Hypothesis<N>| self.left_ringing(heard, h);
-        let cost = |h: &Hypothesis<N>, left: &Left| dot(left, left) + departure(h, &coordinates);
+        let left = |h: &Hypothesis<N>| self.left_ringing(compared, h);
+        let cost = |h: &Hypothesis<N>, left: &RingingResidual| {
+            dot(left, left) + departure(h, &coordinates)
+        };
         for _ in 0..MOST_STEPS {
             let before = cost(&best.hypothesis, &best.left);
             let steps = self.step_of(&best, &coordinates, &left)?;
@@ -145,16 +147,16 @@ impl<const N: usize> PreparedSession<'_, N> {
         &self,
         at: &Tuned<N>,
         coordinates: &[Coordinate],
-        left: &(dyn Fn(&Hypothesis<N>) -> Option<Left> + Sync),
+        left: &(dyn Fn(&Hypothesis<N>) -> Option<RingingResidual> + Sync),
     ) -> Option<Vec<f64>> {
         let slope = |i: usize| {
             let change = self.nudged(&at.hypothesis, &coordinates[i]);
             let moved = left(&change.changed)?;
             let slope = std::iter::zip(&at.left, moved).map(|(l, m)| (l - m) / change.size);
-            Some(slope.collect::<Left>())
+            Some(slope.collect::<RingingResidual>())
         };
         let slopes = self.parallel(coordinates.len(), slope);
-        let slopes: Vec<Left> = slopes.into_iter().collect::<Option<_>>()?;
+        let slopes: Vec<RingingResidual> = slopes.into_iter().collect::<Option<_>>()?;
         let cluster = Cluster {
             configuration: 0,
             gram: Arc::new(Matrix::from_fn(slopes.len(), slopes.len(), |a, b| {
@@ -189,9 +191,13 @@ impl<const N: usize> PreparedSession<'_, N> {
     }
 
     /// What a hypothesis leaves of every channel above the band, away from gaps and without what swings, trial by trial.
-    fn above(&self, heard: &Heard, hypothesis: &Hypothesis<N>) -> Option<Vec<Channels>> {
+    fn above(
+        &self,
+        compared: &ComparedRinging,
+        hypothesis: &Hypothesis<N>,
+    ) -> Option<Vec<Channels>> {
         let one = |i: usize| {
-            let trial = heard.trials[i];
+            let trial = compared.trials[i];
             let (valid, course) = (&self.session.trials[trial].valid, &self.courses[trial]);
             let run = self.session.run(hypothesis, course).ok()?;
             let shown = self.session.read_raw(hypothesis, course, &run).ok()?;
@@ -202,23 +208,27 @@ impl<const N: usize> PreparedSession<'_, N> {
             for channel in &mut above {
                 *channel = kept.iter().map(|&i| channel[i]).collect();
             }
-            let swings = Swings::of(&heard.swings, &kept, course.rate);
+            let swings = Swings::of(&compared.swings, &kept, course.rate);
             swings.take_out(&mut above);
             Some(above)
         };
-        let trials = heard.trials.len();
+        let trials = compared.trials.len();
         self.parallel(trials, one).into_iter().collect()
     }
 
     /// The same in one row, each channel in its size.
-    fn left_ringing(&self, heard: &Heard, hypothesis: &Hypothesis<N>) -> Option<Left> {
-        Some(heard.row(&self.above(heard, hypothesis)?))
+    fn left_ringing(
+        &self,
+        compared: &ComparedRinging,
+        hypothesis: &Hypothesis<N>,
+    ) -> Option<RingingResidual> {
+        Some(compared.row(&self.above(compared, hypothesis)?))
     }
 }
 
-impl Heard {
+impl ComparedRinging {
     /// What is left of every trial in one row, each channel in its size.
-    fn row(&self, trials: &[Channels]) -> Left {
+    fn row(&self, trials: &[Channels]) -> RingingResidual {
         let each = trials
             .iter()
             .flat_map(|t| std::iter::zip(t, &self.sizes))

@@ -4,7 +4,7 @@
 use core::f64::consts::FRAC_PI_2;
 
 use crate::candidates::library::Library;
-use crate::fitting::fit::Fitted;
+use crate::fitting::fit::FittedHypothesis;
 use crate::prepared_session::PreparedSession;
 use crate::selection::score_test::ScoreTest;
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -36,7 +36,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     /// * `scale` - misfit for each degree of freedom
     pub fn in_phase(
         &self,
-        (fitted, point): (&Fitted<N>, &LinearizationPoint<N>),
+        (fitted, point): (&FittedHypothesis<N>, &LinearizationPoint<N>),
         scale: f64,
     ) -> Option<[f64; 2]> {
         let longest = |&t: &usize| self.courses[t].seen[0].len() as f64 / self.courses[t].rate;
@@ -86,7 +86,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn scanned(
         &self,
         waves: &[[f64; 2]],
-        (fitted, point): (&Fitted<N>, &LinearizationPoint<N>),
+        (fitted, point): (&FittedHypothesis<N>, &LinearizationPoint<N>),
     ) -> Option<(Library, ScoreTest)> {
         let library = Library::of_waves(self, point, waves).ok()?;
         let score_test = ScoreTest::new(self, fitted, point, &library).ok()?;
@@ -97,7 +97,7 @@ impl<const N: usize> PreparedSession<'_, N> {
     fn waves_at(
         &self,
         frequencies: &[f64],
-        (fitted, point): (&Fitted<N>, &LinearizationPoint<N>),
+        (fitted, point): (&FittedHypothesis<N>, &LinearizationPoint<N>),
     ) -> Option<Wave> {
         let waves: Vec<[f64; 2]> = frequencies
             .iter()

@@ -6,6 +6,6 @@ pub mod disturbance;
 mod disturbance_shape;
 pub mod in_phase;
 pub mod in_trial;
-mod setting_apart;
+mod rhythm_removal;
 mod spectral_line;
 pub mod tremor_detection;

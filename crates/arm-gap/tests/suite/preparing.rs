@@ -3,7 +3,7 @@
 use arm_core::Joints;
 use arm_core::effect::{Effect, Kind};
 use arm_gap::GapError;
-use arm_gap::data::noise::{Noise, Thinned};
+use arm_gap::data::noise::{NoiseModel, Thinned};
 use arm_gap::data::repeats::groups;
 use arm_gap::data::session::{ComparisonMode, Session};
 use arm_gap::hypothesis::{Coordinate, Target};
@@ -327,7 +327,7 @@ fn once_the_data_are_explained_noise_is_read_off_all_trials() {
     );
 }
 
-fn whitened(noise: &Noise, thinned: &Thinned) -> Vec<f64> {
+fn whitened(noise: &NoiseModel, thinned: &Thinned) -> Vec<f64> {
     let whitening = noise.whitening_at(thinned.observed());
     noise.rows(thinned.channels.clone(), &whitening)
 }
@@ -336,7 +336,7 @@ fn whitened(noise: &Noise, thinned: &Thinned) -> Vec<f64> {
 fn noise_is_never_believed_to_be_below_a_two_thousandth_of_the_range() {
     let silent: Vec<Thinned> = vec![vec![vec![0.0; 500]; 2].into(); 8];
     let range = [2.0, 100.0];
-    let noise = Noise::of(&silent, &[], &range, &[1.0; 2]).expect("noise");
+    let noise = NoiseModel::of(&silent, &[], &range, &[1.0; 2]).expect("noise");
     let rows = whitened(&noise, &vec![vec![1e-3; 64], vec![0.05; 64]].into());
     // 5e-4 of 2 and of 100: one standard deviation each.
     for row in rows.chunks(64) {
@@ -366,7 +366,7 @@ fn noise_that_channels_share_is_taken_for_one() {
             vec![own, other].into()
         })
         .collect();
-    let noise = Noise::of(&series, &[], &[1.0; 2], &[1.0; 2]).expect("noise");
+    let noise = NoiseModel::of(&series, &[], &[1.0; 2], &[1.0; 2]).expect("noise");
     let (mut own, mut both) = ([0.0; 2], 0.0);
     for one in &series {
         let rows = whitened(&noise, one);
@@ -394,7 +394,8 @@ fn without_repeats_noise_is_larger_by_as_much_as_it_is_correlated() {
             .collect()
     };
     let size = |series: &[Vec<Vec<f64>>]| {
-        let noise = Noise::without_repeats(series, &[1.0], (&[1.0], Vec::new())).expect("noise");
+        let noise =
+            NoiseModel::without_repeats(series, &[1.0], (&[1.0], Vec::new())).expect("noise");
         1.0 / whitened(&noise, &vec![vec![1.0; 2]].into())[1]
     };
     let (white, slow) = (size(&slow(0.0)), size(&slow(0.9)));

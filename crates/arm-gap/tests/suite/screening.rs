@@ -2,7 +2,7 @@
 
 use arm_core::effect::{Effect, Kind};
 use arm_gap::prepared_session::PreparedSession;
-use arm_gap::selection::model_discrimination::Contest;
+use arm_gap::selection::model_discrimination::Discrimination;
 
 use crate::sessions::session;
 
@@ -15,7 +15,7 @@ fn spring() -> Effect<f64> {
 fn a_first_look_suspects_the_hidden_spring_most_and_names_nothing() {
     let session = session(&[spring()], (1e-3, 0.1));
     let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
-    let look = prepared.look(&|_, _| Ok(())).expect("a look");
+    let look = prepared.screen(&|_, _| Ok(())).expect("a look");
     assert!(look.calibrated.hypothesis.named.is_empty());
     assert!(look.lack.z > 6.0, "{:?}", look.lack);
     let worth = |s: &arm_gap::search::first_order_screening::ScreenedCandidate| s.gain - s.price;
@@ -39,7 +39,7 @@ fn a_first_look_suspects_the_hidden_spring_most_and_names_nothing() {
 fn a_first_look_at_a_session_that_lacks_nothing_suspects_nothing() {
     let session = session(&[], (1e-3, 0.1));
     let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
-    let look = prepared.look(&|_, _| Ok(())).expect("a look");
+    let look = prepared.screen(&|_, _| Ok(())).expect("a look");
     let loud: Vec<_> = look.suspects.iter().filter(|s| s.gain > s.price).collect();
     assert!(loud.is_empty(), "{loud:?}");
     assert!(look.lack.z < 4.0, "{:?}", look.lack);
@@ -55,11 +55,11 @@ fn movements_tell_a_spring_from_friction_and_not_from_itself() {
         (spring(), vec![0]),
         (Effect::new(coulomb, 1).with(&[0.2, 0.01]), vec![0]),
     ];
-    let contest = Contest::new(prepared, spring(), &rivals).expect("a contest");
-    let now = contest.distances(None).expect("distances");
+    let discrimination = Discrimination::new(prepared, spring(), &rivals).expect("a comparison");
+    let now = discrimination.distances(None).expect("distances");
     assert!(now[0] < 0.1, "{now:?}");
     assert!(now[1] > 5.0, "{now:?}");
-    let then = contest
+    let then = discrimination
         .distances(Some(&session.trials[4]))
         .expect("distances with one movement more");
     assert!(then[0] < 0.1 && then[1] > now[1], "{now:?} {then:?}");

@@ -8,7 +8,7 @@ use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::course::Course;
 use crate::data::session::ComparisonMode;
-use crate::fitting::fit::Fitted;
+use crate::fitting::fit::FittedHypothesis;
 use crate::fitting::lack_of_fit::lack_of_fit;
 use crate::prepared_session::PreparedSession;
 use crate::selection::search_state::{Progress, SearchState, Settled};
@@ -21,7 +21,7 @@ use crate::trial_specific::tremor_detection::Line;
 const DISTURBANCES: usize = 4;
 /// What is kept apart from effects that last.
 #[derive(Clone)]
-pub(crate) struct SetApart<const N: usize> {
+pub(crate) struct TrialSpecificEffects<const N: usize> {
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
     /// Frequency \[Hz\] and phase \[rad\] of a slow oscillation with one phase in all trials, which is tested like other effects.
@@ -30,9 +30,9 @@ pub(crate) struct SetApart<const N: usize> {
     pub measured: Vec<Arc<Course<N>>>,
 }
 
-impl<const N: usize> SetApart<N> {
+impl<const N: usize> TrialSpecificEffects<N> {
     /// Keeps a slow oscillation only if one is named: another may be found later then.
-    pub fn keep_periodic_if_named(&mut self, fitted: &Fitted<N>) {
+    pub fn keep_periodic_if_named(&mut self, fitted: &FittedHypothesis<N>) {
         let mut kinds = fitted.asked.iter().map(Candidate::kind);
         let named = kinds.any(|kind| kind.prior().nature.swings());
         self.periodic = self.periodic.filter(|_| named);
@@ -49,7 +49,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn set_apart(
         &mut self,
         mut settled: Settled<'a, N>,
-        apart: &mut SetApart<N>,
+        apart: &mut TrialSpecificEffects<N>,
     ) -> Result<Settled<'a, N>, GapError> {
         let led = self.session.comparison == ComparisonMode::Led;
         let rhythm = led.then(|| self.rhythm(&settled.1, Line::BetweenRepeats));
@@ -62,7 +62,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Looks for a slow oscillation where much is left, before effects are named that adapt to it.
-    pub(crate) fn slow_oscillation(&self, settled: &Settled<'a, N>, apart: &mut SetApart<N>) {
+    pub(crate) fn slow_oscillation(
+        &self,
+        settled: &Settled<'a, N>,
+        apart: &mut TrialSpecificEffects<N>,
+    ) {
         let (fitted, point) = settled;
         if fitted.leaves_much() {
             let scale = fitted.cost / fitted.rows as f64;
@@ -75,7 +79,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn rhythm_asked_again(
         &mut self,
         state: SearchState<'a, N>,
-        apart: &mut SetApart<N>,
+        apart: &mut TrialSpecificEffects<N>,
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
         if state.current.asked.is_empty() {
@@ -117,7 +121,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn rhythms_in_phase(
         &mut self,
         mut state: SearchState<'a, N>,
-        apart: &mut SetApart<N>,
+        apart: &mut TrialSpecificEffects<N>,
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
         for _ in 0..2 {
@@ -136,7 +140,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn locked_set_apart_again(
         &mut self,
         state: SearchState<'a, N>,
-        apart: &mut SetApart<N>,
+        apart: &mut TrialSpecificEffects<N>,
     ) -> Result<SearchState<'a, N>, GapError> {
         let all = apart.trial_specific.iter_mut();
         let mut rhythms = all.filter(|one| one.trial.is_none());
@@ -165,7 +169,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn sets_apart_in_phase(
         &mut self,
         state: &SearchState<'a, N>,
-        apart: &mut SetApart<N>,
+        apart: &mut TrialSpecificEffects<N>,
     ) -> Result<bool, GapError> {
         let mut found = None;
         for line in [Line::OfTheRobot, Line::InPhase] {
@@ -200,7 +204,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub(crate) fn disturbances_asked_again(
         &mut self,
         mut state: SearchState<'a, N>,
-        apart: &mut SetApart<N>,
+        apart: &mut TrialSpecificEffects<N>,
     ) -> Result<SearchState<'a, N>, GapError> {
         let found = &mut apart.trial_specific;
         if state.current.asked.is_empty() || found.iter().all(|a| a.trial.is_none()) {
@@ -246,7 +250,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn in_the_likelier_repeat(
         &self,
         (one, trial): (TrialSpecific, usize),
-        fitted: &Fitted<N>,
+        fitted: &FittedHypothesis<N>,
     ) -> (TrialSpecific, usize) {
         let group = self.group_of[trial];
         let repeats = self.fitted.iter().copied();
