@@ -18,8 +18,9 @@ from .workflows.simulate import Sensors
 __all__ = [
     "DECISIONS",
     "JOINT_LAWS",
-    "MISFIT",
+    "LACK_OF_FIT",
     "MOST_STEPS",
+    "OPEN_GAP",
     "SAMPLE_STATUSES",
     "SPEED_NOISE_ALLOWED",
     "STILL",
@@ -110,8 +111,9 @@ __all__ = [
 __version__: str
 build_profile: str
 DECISIONS: tuple[str, str, str]
-MISFIT: float
+LACK_OF_FIT: float
 MOST_STEPS: float
+OPEN_GAP: float
 STILL: float
 THRESHOLD: float
 TIE: float

@@ -5,7 +5,7 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::arrays::{Numbers, Rows, over_rows};
+use crate::arrays::{Numbers, RowBatch, over_rows};
 use crate::errors::{bad_input, invalid};
 use crate::row_kernels::{self, MOST};
 
@@ -131,12 +131,12 @@ impl Arm {
     pub fn rows<'a>(
         &self,
         [(a, x), (b, y), (c, z)]: [(&'static str, &'a Numbers<'_>); 3],
-    ) -> PyResult<[Rows<'a>; 3]> {
+    ) -> PyResult<[RowBatch<'a>; 3]> {
         let n = self.n_joints();
         Ok([
-            Rows::new(a, x, n)?,
-            Rows::new(b, y, n)?,
-            Rows::new(c, z, n)?,
+            RowBatch::new(a, x, n)?,
+            RowBatch::new(b, y, n)?,
+            RowBatch::new(c, z, n)?,
         ])
     }
 }
@@ -269,32 +269,32 @@ impl Arm {
 
     /// Position of the tip, shape (2,) or (n_samples, 2) [m].
     fn forward_kinematics<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        let rows = [Rows::new("q", &q, self.n_joints())?];
+        let rows = [RowBatch::new("q", &q, self.n_joints())?];
         each_length!(&self.chain, c => over_rows(py, row_kernels::ForwardKinematics, c, rows))
     }
 
     /// Derivative of the tip position to the joint angles, shape (2, n_joints) or (n_samples, 2, n_joints) [m/rad].
     fn jacobian<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        let rows = [Rows::new("q", &q, self.n_joints())?];
+        let rows = [RowBatch::new("q", &q, self.n_joints())?];
         each_length!(&self.chain, c => over_rows(py, row_kernels::Jacobian, c, rows))
     }
 
     /// Inertia matrix B(q), shape (n_joints, n_joints), with the batch in front [kg m²].
     fn inertia<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        let rows = [Rows::new("q", &q, self.n_joints())?];
+        let rows = [RowBatch::new("q", &q, self.n_joints())?];
         each_length!(&self.chain, c => over_rows(py, row_kernels::Inertia, c, rows))
     }
 
     /// Coriolis and centrifugal torques C(q, q̇) q̇, shape of `q` [N m].
     fn coriolis<'py>(&self, py: Python<'py>, q: Numbers<'py>, qd: Numbers<'py>) -> Array<'py> {
         let n = self.n_joints();
-        let rows = [Rows::new("q", &q, n)?, Rows::new("qd", &qd, n)?];
+        let rows = [RowBatch::new("q", &q, n)?, RowBatch::new("qd", &qd, n)?];
         each_length!(&self.chain, c => over_rows(py, row_kernels::Coriolis, c, rows))
     }
 
     /// Gravity torques G(q), shape of `q` [N m].
     fn gravity<'py>(&self, py: Python<'py>, q: Numbers<'py>) -> Array<'py> {
-        let rows = [Rows::new("q", &q, self.n_joints())?];
+        let rows = [RowBatch::new("q", &q, self.n_joints())?];
         each_length!(&self.chain, c => over_rows(py, row_kernels::Gravity, c, rows))
     }
 
@@ -308,8 +308,8 @@ impl Arm {
         force_on_arm: Numbers<'py>,
     ) -> Array<'py> {
         let rows = [
-            Rows::new("q", &q, self.n_joints())?,
-            Rows::new("force_on_arm", &force_on_arm, 2)?,
+            RowBatch::new("q", &q, self.n_joints())?,
+            RowBatch::new("force_on_arm", &force_on_arm, 2)?,
         ];
         each_length!(&self.chain, c => over_rows(py, row_kernels::StaticTorque, c, rows))
     }

@@ -91,14 +91,14 @@ fn named(refused: &PyErr, name: &str) -> PyErr {
 }
 
 /// Rows of `width` numbers: a single one or a batch.
-pub struct Rows<'a> {
+pub struct RowBatch<'a> {
     name: &'static str,
     values: Cow<'a, [f64]>,
     width: usize,
     batch: Option<usize>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> RowBatch<'a> {
     /// Reads an argument of shape `(width,)` or `(n, width)`.
     pub fn new(name: &'static str, given: &'a Numbers<'_>, width: usize) -> PyResult<Self> {
         let array = given.array(name)?;
@@ -182,7 +182,7 @@ pub fn over_rows<'py, F: Kernel<K>, const K: usize, const N: usize>(
     py: Python<'py>,
     _: F,
     chain: &Chain<f64, N>,
-    inputs: [Rows<'_>; K],
+    inputs: [RowBatch<'_>; K],
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let batch = inputs.iter().find_map(|r| r.batch);
     if let (Some(n), Some(other)) = (
@@ -244,7 +244,7 @@ pub fn over_rows<'py, F: Kernel<K>, const K: usize, const N: usize>(
 struct Groups<'a, F, const K: usize, const N: usize> {
     kernel: PhantomData<F>,
     chain: Chain<Lanes<LANES>, N>,
-    inputs: &'a [Rows<'a>; K],
+    inputs: &'a [RowBatch<'a>; K],
     /// Numbers of a result.
     size: usize,
     out: &'a mut [f64],
@@ -288,7 +288,7 @@ impl<F: Kernel<K>, const K: usize, const N: usize> Computation for Groups<'_, F,
 /// All arguments are batches of the same length.
 pub fn in_order<'py, const K: usize>(
     py: Python<'py>,
-    inputs: [Rows<'_>; K],
+    inputs: [RowBatch<'_>; K],
     width: usize,
     mut f: impl FnMut([&[f64]; K], &mut [f64]),
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use crate::arm::{AnyChain, each_short_length};
 use crate::arrays::rows;
 use crate::errors::{bad_input, identification, simulation};
-use crate::identification::{Settings, model};
+use crate::identification::{IdentificationSettings, model};
 use crate::results;
 use crate::rig::Rig;
 
@@ -61,7 +61,7 @@ pub struct Search {
 fn question<const N: usize>(
     chain: &Chain<f64, N>,
     rig: &Rig,
-    (settings, sensing): (&Settings, &Sensing),
+    (settings, sensing): (&IdentificationSettings, &Sensing),
 ) -> PyResult<Question<N>> {
     Ok(Question {
         model: model(chain, rig, settings)?,
@@ -82,7 +82,7 @@ fn question<const N: usize>(
 pub fn forecast_py<'py>(
     py: Python<'py>,
     rig: &Rig,
-    settings: Settings,
+    settings: IdentificationSettings,
     sensing: Sensing,
     tasks: (Vec<Planned<'py>>, usize),
 ) -> PyResult<results::Forecast> {
@@ -90,7 +90,7 @@ pub fn forecast_py<'py>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (settings, sensing): (&Settings, &Sensing),
+        (settings, sensing): (&IdentificationSettings, &Sensing),
         (tasks, repeats): (&[Planned<'py>], usize),
     ) -> PyResult<results::Forecast> {
         let question = question(chain, rig, (settings, sensing))?;
@@ -131,7 +131,7 @@ pub fn forecast_py<'py>(
 pub fn design_py(
     py: Python<'_>,
     rig: &Rig,
-    settings: Settings,
+    settings: IdentificationSettings,
     sensing: Sensing,
     bounds: Bounds,
     search: Search,
@@ -140,7 +140,7 @@ pub fn design_py(
         py: Python<'_>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (settings, sensing): (&Settings, &Sensing),
+        (settings, sensing): (&IdentificationSettings, &Sensing),
         (bounds, search): (&Bounds, &Search),
     ) -> PyResult<results::Design> {
         let question = question(chain, rig, (settings, sensing))?;
@@ -175,7 +175,7 @@ pub fn design_py(
 }
 
 /// The effects that are fitted, in their order.
-fn fitted(rig: &Rig, settings: &Settings) -> Vec<Effect<f64>> {
+fn fitted(rig: &Rig, settings: &IdentificationSettings) -> Vec<Effect<f64>> {
     let each = rig.effects.iter().zip(settings.fitted());
     each.filter_map(|(effect, fit)| fit.then_some(*effect))
         .collect()

@@ -10,7 +10,7 @@ use crate::arrays::by_rows;
 use crate::errors::{bad_input, identification};
 use crate::results::RunFit;
 use crate::rig::Rig;
-use crate::simulation::{Driven, Settings, experiment};
+use crate::simulation::{Driven, RunSettings, experiment};
 
 /// What was recorded, C-contiguous, and the noise of its channels.
 #[derive(FromPyObject)]
@@ -32,7 +32,7 @@ pub fn fit_by_simulation<'py>(
     py: Python<'py>,
     rig: &Rig,
     drive: Driven<'py>,
-    settings: Settings,
+    settings: RunSettings,
     recorded: Records<'py>,
     free: Vec<(usize, usize, f64, f64)>,
 ) -> PyResult<RunFit> {
@@ -40,7 +40,7 @@ pub fn fit_by_simulation<'py>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings, recorded): (&Driven<'py>, &Settings, &Records<'py>),
+        (drive, settings, recorded): (&Driven<'py>, &RunSettings, &Records<'py>),
         free: &[Free],
     ) -> PyResult<RunFit> {
         if recorded.q.shape()[1] != N {

@@ -24,7 +24,7 @@ use crate::rig::Rig;
 
 /// What is known beforehand: the attributes of a Python `SearchSettings`.
 #[derive(FromPyObject)]
-pub struct Settings {
+pub struct SearchSettings {
     /// The model as given.
     model: Py<model::Model>,
     /// Whether the forces in the files are on the robot.
@@ -43,11 +43,11 @@ pub struct Settings {
 struct Call<'a, 'py> {
     rig: &'a Rig,
     trials: &'a [Columns<'py>],
-    settings: &'a Settings,
+    settings: &'a SearchSettings,
 }
 
 impl<'a, 'py> Call<'a, 'py> {
-    fn of(rig: &'a Rig, trials: &'a [Columns<'py>], settings: &'a Settings) -> Self {
+    fn of(rig: &'a Rig, trials: &'a [Columns<'py>], settings: &'a SearchSettings) -> Self {
         Self {
             rig,
             trials,
@@ -123,7 +123,7 @@ pub fn play(
     py: Python<'_>,
     rig: &Rig,
     trials: Vec<Columns<'_>>,
-    settings: Settings,
+    settings: SearchSettings,
     own: bool,
 ) -> PyResult<Vec<SimulatedTrial>> {
     fn run<const N: usize>(
@@ -162,7 +162,7 @@ pub fn play(
 
 /// How far each joint moves in the fit trials, in the common band [rad]; in one of several trials a sensor may slip.
 #[pyfunction]
-pub fn reach(rig: &Rig, trials: Vec<Columns<'_>>, settings: Settings) -> PyResult<Vec<f64>> {
+pub fn reach(rig: &Rig, trials: Vec<Columns<'_>>, settings: SearchSettings) -> PyResult<Vec<f64>> {
     fn run<const N: usize>(chain: &Chain<f64, N>, call: &Call<'_, '_>) -> PyResult<Vec<f64>> {
         Ok(call.session(chain)?.reach().to_vec())
     }
@@ -177,7 +177,7 @@ pub fn find_gap(
     py: Python<'_>,
     rig: &Rig,
     trials: Vec<Columns<'_>>,
-    settings: Settings,
+    settings: SearchSettings,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<GapResult> {
     fn run<const N: usize>(
@@ -208,7 +208,7 @@ pub fn look(
     py: Python<'_>,
     rig: &Rig,
     trials: Vec<Columns<'_>>,
-    settings: Settings,
+    settings: SearchSettings,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Screening> {
     fn run<const N: usize>(
@@ -298,7 +298,7 @@ pub fn distances(
     py: Python<'_>,
     rig: &Rig,
     trials: Vec<Columns<'_>>,
-    settings: Settings,
+    settings: SearchSettings,
     planned: Vec<Columns<'_>>,
     rivals: Vec<PyRef<'_, Alternative>>,
 ) -> PyResult<Vec<Option<Vec<f64>>>> {

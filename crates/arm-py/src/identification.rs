@@ -41,7 +41,7 @@ pub struct Columns<'py> {
 
 /// How to identify: the attributes of a Python `CoreSettings`.
 #[derive(FromPyObject)]
-pub struct Settings {
+pub struct IdentificationSettings {
     method: String,
     fitted: Vec<bool>,
     /// The model as given.
@@ -53,7 +53,7 @@ pub struct Settings {
     threads: usize,
 }
 
-impl Settings {
+impl IdentificationSettings {
     /// What the calibration promises.
     pub fn tolerance(&self) -> Tolerance {
         *self.tolerance.get().inner()
@@ -157,7 +157,7 @@ fn cannot_undo(effect: &Effect<f64>) -> PyErr {
 pub fn model<const N: usize>(
     chain: &Chain<f64, N>,
     rig: &Rig,
-    settings: &Settings,
+    settings: &IdentificationSettings,
 ) -> PyResult<Model<N>> {
     let mut setup = rig.setup(chain);
     let (mut fitted, mut held): (Vec<Effect<f64>>, Vec<Effect<f64>>) = (Vec::new(), Vec::new());
@@ -192,13 +192,13 @@ pub fn identify(
     py: Python<'_>,
     rig: &Rig,
     trials: Vec<Columns<'_>>,
-    settings: Settings,
+    settings: IdentificationSettings,
 ) -> PyResult<Identification> {
     fn run<const N: usize>(
         py: Python<'_>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        input: (&[Columns<'_>], &Settings),
+        input: (&[Columns<'_>], &IdentificationSettings),
     ) -> PyResult<Identification> {
         let (columns, settings) = input;
         let model = model(chain, rig, settings)?;

@@ -14,7 +14,7 @@ use crate::errors::{bad_input, simulation};
 use crate::online::{GravityCompensator, OnlineCompensation};
 use crate::rig::Rig;
 use crate::row_kernels::joints;
-use crate::simulation::{Driven, Settings, experiment};
+use crate::simulation::{Driven, RunSettings, experiment};
 
 /// The robot's controller and what the supervisor allows.
 #[derive(FromPyObject)]
@@ -104,14 +104,14 @@ pub fn control<'py>(
     py: Python<'py>,
     rig: &Rig,
     drive: Driven<'py>,
-    settings: Settings,
+    settings: RunSettings,
     watch: Watch,
 ) -> PyResult<Bound<'py, PyDict>> {
     fn run<const N: usize>(
         py: Python<'_>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings, watch): (&Driven<'_>, &Settings, &Watch),
+        (drive, settings, watch): (&Driven<'_>, &RunSettings, &Watch),
     ) -> PyResult<Controlled> {
         let experiment = experiment(chain, rig, drive, settings)?;
         let (controller, safety) = watch.settings();
@@ -158,7 +158,7 @@ pub fn interact<'py>(
     py: Python<'py>,
     rig: &Rig,
     drive: Driven<'py>,
-    settings: Settings,
+    settings: RunSettings,
     device: (Watch, Yielding),
     perturbation: PyReadonlyArray2<'py, f64>,
     support: Option<(Bound<'py, OnlineCompensation>, f64, f64)>,
@@ -167,7 +167,7 @@ pub fn interact<'py>(
         py: Python<'_>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings, watch, yielding): (&Driven<'_>, &Settings, &Watch, &Yielding),
+        (drive, settings, watch, yielding): (&Driven<'_>, &RunSettings, &Watch, &Yielding),
         pushed: &[f64],
         support: Option<(&(dyn GravityCompensator + Sync), f64, f64)>,
     ) -> PyResult<Yielded> {

@@ -39,7 +39,7 @@ pub struct Driven<'py> {
 
 /// Numerical settings, a Python `CoreRun`.
 #[derive(FromPyObject)]
-pub struct Settings {
+pub struct RunSettings {
     engine: String,
     integrator: String,
     dt: f64,
@@ -50,7 +50,7 @@ pub struct Settings {
     qd: Option<Vec<f64>>,
 }
 
-impl Settings {
+impl RunSettings {
     fn engine(&self) -> PyResult<Engine> {
         match self.engine.as_str() {
             "native" => Ok(Engine::Native),
@@ -107,14 +107,14 @@ pub fn simulate<'py>(
     py: Python<'py>,
     rig: &Rig,
     drive: Driven<'py>,
-    settings: Settings,
+    settings: RunSettings,
     sensing: Option<(Sensing, Vec<u64>)>,
 ) -> PyResult<Recorded> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings, sensing): (&Driven<'py>, &Settings, Option<&(Sensing, Vec<u64>)>),
+        (drive, settings, sensing): (&Driven<'py>, &RunSettings, Option<&(Sensing, Vec<u64>)>),
     ) -> PyResult<Recorded> {
         let experiment = experiment(chain, rig, drive, settings)?;
         let engine = settings.engine()?;
@@ -150,7 +150,7 @@ pub fn simulate_accurately<'py>(
     py: Python<'py>,
     rig: &Rig,
     drive: Driven<'py>,
-    settings: Settings,
+    settings: RunSettings,
     accuracy: f64,
     sensing: Option<(Sensing, Vec<u64>)>,
 ) -> PyResult<(Recorded, f64, f64)> {
@@ -158,7 +158,7 @@ pub fn simulate_accurately<'py>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings, accuracy): (&Driven<'py>, &Settings, f64),
+        (drive, settings, accuracy): (&Driven<'py>, &RunSettings, f64),
         sensing: Option<&(Sensing, Vec<u64>)>,
     ) -> PyResult<(Recorded, f64, f64)> {
         let mut experiment = experiment(chain, rig, drive, settings)?;
@@ -179,14 +179,14 @@ pub fn resolve<'py>(
     py: Python<'py>,
     rig: &Rig,
     drive: Driven<'py>,
-    settings: Settings,
+    settings: RunSettings,
     accuracy: f64,
 ) -> PyResult<(f64, f64)> {
     fn run<'py, const N: usize>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings, accuracy): (&Driven<'py>, &Settings, f64),
+        (drive, settings, accuracy): (&Driven<'py>, &RunSettings, f64),
     ) -> PyResult<(f64, f64)> {
         let experiment = experiment(chain, rig, drive, settings)?;
         let mut interrupted = None;
@@ -212,7 +212,7 @@ pub fn simulate_in_pieces<'py>(
     py: Python<'py>,
     rig: &Rig,
     drive: Driven<'py>,
-    settings: Settings,
+    settings: RunSettings,
     samples: usize,
     take: Py<PyAny>,
 ) -> PyResult<()> {
@@ -220,7 +220,7 @@ pub fn simulate_in_pieces<'py>(
         py: Python<'py>,
         chain: &Chain<f64, N>,
         rig: &Rig,
-        (drive, settings): (&Driven<'py>, &Settings),
+        (drive, settings): (&Driven<'py>, &RunSettings),
         (samples, take): (usize, &Py<PyAny>),
     ) -> PyResult<()> {
         let experiment = experiment(chain, rig, drive, settings)?;
@@ -253,7 +253,7 @@ pub fn experiment<const N: usize>(
     chain: &Chain<f64, N>,
     rig: &Rig,
     drive: &Driven<'_>,
-    settings: &Settings,
+    settings: &RunSettings,
 ) -> PyResult<Experiment<N>> {
     let base = base_path(drive)?;
     let feels_activity = rig.effects.iter().any(|e| e.kind.feels_activity());

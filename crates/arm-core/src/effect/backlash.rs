@@ -18,7 +18,7 @@ impl Law for Backlash {
         ],
         states: 0,
     };
-    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).small(2e-4)]).missing(0.003);
+    const PRIOR: Prior = Prior::lasting(&[Part::of(&[0, 1]).small(2e-4)]).with_law_error(0.003);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         for axis in 0..2 {

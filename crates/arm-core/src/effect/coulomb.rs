@@ -25,7 +25,7 @@ impl Law for Coulomb {
     const SMOOTHED_BY: Option<usize> = Some(1);
     const RATE_INDEPENDENT: bool = true;
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])])
-        .missing(0.03)
+        .with_law_error(0.03)
         .in_family(Family::Dry)
         .typically(0.1)
         .passive();

@@ -21,7 +21,7 @@ impl Law for CubicElastic {
     const TITLE: Option<&'static str> = Some("cubic spring");
     const PRIOR: Prior =
         Prior::lasting(&[Part::of(&[0]).shaped(&[(1, Values::Across)]).varying(&[1])])
-            .missing(0.002)
+            .with_law_error(0.002)
             .typically(2.0);
 
     #[inline]

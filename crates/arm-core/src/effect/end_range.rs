@@ -32,7 +32,7 @@ impl Law for EndRange {
             .shaped(&[(2, Values::Each(&[5.0, 8.0, 12.0])), (4, Values::Lowest)])
             .varying(&[2]),
     ])
-    .missing(0.05);
+    .with_law_error(0.05);
 
     #[inline]
     fn torque<T: Scalar>(p: &Parameters<T>, at: &Local<T>) -> T {

@@ -26,7 +26,7 @@ impl Law for LoadFriction {
     const FEELS_FORCE: bool = true;
     const SMOOTHED_BY: Option<usize> = Some(1);
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0]).varying(&[1])])
-        .missing(0.03)
+        .with_law_error(0.03)
         .in_family(Family::Dry);
 
     #[inline]

@@ -12,8 +12,9 @@ pub struct Prior {
     pub nature: Nature,
     /// What of it is within the tolerance of a rig's calibration.
     pub promise: Option<Promise>,
-    /// Possible error of its law, as a share of its sum of squares: large for laws that represent a family of shapes.
-    pub missed: f64,
+    /// Square of the possible relative error of its law, the share of its sum of squares that it may leave unexplained: large for laws that
+    /// represent a family of shapes.
+    pub squared_law_error: f64,
     /// Its family, where its place does not decide it.
     pub family: Option<Family>,
     /// Typical size of its first parameter, for one N m of the arm's weight moment; zero where nothing is known.
@@ -191,7 +192,7 @@ impl Prior {
             parts,
             nature: Nature::Lasting,
             promise: None,
-            missed: 2e-5,
+            squared_law_error: 2e-5,
             family: None,
             typical: 0.0,
             passive: false,
@@ -205,9 +206,12 @@ impl Prior {
     /// A part whose size is the first parameter.
     pub const FIRST: Self = Self::lasting(&[Part::of(&[0])]);
 
-    /// With a law that may miss a share of what it shows.
-    pub const fn missing(self, missed: f64) -> Self {
-        Self { missed, ..self }
+    /// With the square of the possible relative error of its law.
+    pub const fn with_law_error(self, squared_law_error: f64) -> Self {
+        Self {
+            squared_law_error,
+            ..self
+        }
     }
 
     /// What is within the tolerance of the calibration.

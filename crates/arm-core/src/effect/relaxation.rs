@@ -23,7 +23,7 @@ impl Law for Relaxation {
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[0.3, 1.0, 3.0]))])
         .varying(&[1])])
-    .missing(0.002)
+    .with_law_error(0.002)
     .typically(1.0);
 
     #[inline]

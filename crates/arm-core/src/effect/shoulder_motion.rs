@@ -24,7 +24,7 @@ impl Law for ShoulderMotion {
     // The path of a shoulder is bent.
     const PRIOR: Prior =
         Prior::lasting(&[Part::of(&[0, 1]).shaped(&[(2, Values::Middle)]).small(1e-5)])
-            .missing(0.003);
+            .with_law_error(0.003);
 
     fn alter<T: Scalar, const N: usize>(p: &Parameters<T>, _index: usize, setup: &mut Setup<T, N>) {
         setup.base_motion[0] += p[0];

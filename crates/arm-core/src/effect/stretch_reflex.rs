@@ -40,7 +40,7 @@ impl Law for StretchReflex {
         ])
         .varying(&[1, LATENCY])
         .expecting(&[(LATENCY, EXPECTED_LATENCY)])])
-    .missing(0.1)
+    .with_law_error(0.1)
     .in_family(Family::Muscle)
     .typically(0.2);
 

@@ -29,7 +29,7 @@ impl Law for Stribeck {
     const PRIOR: Prior = Prior::lasting(&[Part::of(&[0])
         .shaped(&[(1, Values::Each(&[0.03, 0.06, 0.12]))])
         .varying(&[1, 2])])
-    .missing(0.05)
+    .with_law_error(0.05)
     .in_family(Family::Dry)
     .typically(0.1);
 

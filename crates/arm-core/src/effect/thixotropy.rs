@@ -34,7 +34,7 @@ impl Law for Thixotropy {
             (4, Values::Each(&[1.0, 3.0, 10.0])),
         ])
         .varying(&[3, 4])])
-    .missing(0.05)
+    .with_law_error(0.05)
     .in_family(Family::Dry)
     .typically(0.1);
 

@@ -23,7 +23,9 @@ pub use root_mean_square::{pairwise_sum, root_mean_square};
 pub use search_input::{SearchInput, TrialFile};
 pub use simulated_trial::{SimulatedTrial, Version, sizes};
 pub use value::Value;
-pub use verdict::{Evidence, MISFIT, NEAR_NOISE, NEGLIGIBLE, Verdict};
+pub use verdict::{Evidence, LACK_OF_FIT, NEAR_NOISE, NEGLIGIBLE, Verdict};
+
+pub use crate::selection::held_out::OPEN_GAP;
 
 use arm_core::effect::Kind;
 use arm_model::Site;

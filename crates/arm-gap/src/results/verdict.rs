@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// Lack of fit from which on something is left, in standard deviations of white rows: coloured noise is never quite white, and
 /// sessions with nothing hidden reach 4.8.
-pub const MISFIT: f64 = 6.0;
+pub const LACK_OF_FIT: f64 = 6.0;
 /// Share of the calibrated model's lack of fit that may be left where effects were named: the shape of a law is never exact.
 pub const NEGLIGIBLE: f64 = 0.05;
 /// Ratio of the residual variance to that of repeats from which on no share is negligible: what is left is then larger than the noise.
@@ -41,7 +41,7 @@ impl Verdict {
     /// All verdicts.
     pub const ALL: [Self; 3] = [Self::Explained, Self::NothingMissing, Self::Unexplained];
 
-    /// The verdict rule: `unexplained` where a channel is open on the test trials, or where the lack of fit is at least [`MISFIT`] and not
+    /// The verdict rule: `unexplained` where a channel is open on the test trials, or where the lack of fit is at least [`LACK_OF_FIT`] and not
     /// negligible; else `explained` where an effect was named. Without repeats the test trials alone decide.
     pub fn of(evidence: &Evidence) -> Self {
         let Evidence {
@@ -52,7 +52,7 @@ impl Verdict {
             share,
         } = *evidence;
         let negligible = named && share < NEGLIGIBLE && ratio < NEAR_NOISE;
-        if is_open || (z >= MISFIT && !negligible) {
+        if is_open || (z >= LACK_OF_FIT && !negligible) {
             Self::Unexplained
         } else if named {
             Self::Explained

@@ -261,7 +261,7 @@ fn widened<const N: usize>(
 ) -> Precision {
     let mut precision = alone.clone();
     for one in named {
-        let missed = one.gain * amended.asked[one.slot].kind().prior().missed;
+        let missed = one.gain * amended.asked[one.slot].kind().prior().squared_law_error;
         let is_own = |t| matches!(t, Target::Named(own, _) if own == one.slot);
         precision.widen(is_own, Precision::ALONG * missed);
         let joint = joint_of(&amended.hypothesis, Target::Named(one.slot, 0));
@@ -270,7 +270,7 @@ fn widened<const N: usize>(
     }
     for law in base {
         let known = first + law.base;
-        let missed = law.gain * law.question.kind().prior().missed;
+        let missed = law.gain * law.question.kind().prior().squared_law_error;
         precision.widen(
             |t| matches!(t, Target::Known(own, _) if own == known),
             Precision::ALONG * missed,

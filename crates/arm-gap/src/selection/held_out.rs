@@ -47,7 +47,7 @@ const TOLERATED: f64 = 0.1;
 /// Standard normal quantile of the test's level, 0.001 for each channel.
 const LEVEL: f64 = 3.09;
 /// Ratio to its floor above which a gap counts as clear,
-const PLAIN: f64 = 1.5;
+pub const OPEN_GAP: f64 = 1.5;
 /// and standard deviations of the floor that it must exceed it by: the table shows no more.
 const UNCERTAIN: f64 = 1.0;
 
@@ -118,7 +118,7 @@ fn channel(trials: &[TrialResidual], c: usize) -> HeldOutGap {
     };
     if let Some(size) = size {
         let ratio = size / (floor * (1.0 + TOLERATED));
-        let plain = size > floor * f64::max(PLAIN, 1.0 + UNCERTAIN * libm::sqrt(relative));
+        let plain = size > floor * f64::max(OPEN_GAP, 1.0 + UNCERTAIN * libm::sqrt(relative));
         let beyond_chance = fisher(ratio * ratio, own.max(1.0), freedom.all) > LEVEL;
         if gap.open.is_none() && (plain || beyond_chance) {
             gap.open = left

@@ -55,7 +55,7 @@ fn mimicked(effect: &Effect<f64>, by: &Effect<f64>, gain: f64) -> f64 {
         (false, false) => ELSEWHERE,
         (false, true) => SWINGING,
     };
-    by.kind.prior().missed * gain * part
+    by.kind.prior().squared_law_error * gain * part
 }
 
 /// The most that an absent effect may explain beside named ones that together explain so much: of each by its gain in the last
@@ -340,7 +340,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     fn tie(&self, own: &Candidate, gain: f64) -> f64 {
         match self.repeated {
             true => TIE,
-            false => TIE.max(own.kind().prior().missed * gain),
+            false => TIE.max(own.kind().prior().squared_law_error * gain),
         }
     }
 
@@ -529,7 +529,7 @@ mod tests {
     #[test]
     fn an_effect_must_explain_more_than_the_law_of_another_misses() {
         let friction = Effect::<f64>::new(Kind::Coulomb, 1);
-        let missed = friction.kind.prior().missed;
+        let missed = friction.kind.prior().squared_law_error;
         assert_eq!(missed, 0.03);
         let in_joint = |kind, joint| mimicked(&Effect::<f64>::new(kind, joint), &friction, 1000.0);
         assert_eq!(in_joint(Kind::Viscous, 1), 1000.0 * missed);

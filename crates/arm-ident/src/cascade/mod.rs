@@ -33,7 +33,7 @@ use crate::inference::estimate::Identified;
 use crate::inference::independent_blocks::cluster_ranges;
 use crate::regression::measured_motion::candidates;
 use crate::regression::preprocessing::Pieces;
-use crate::regression::rows::Rows;
+use crate::regression::rows::RegressionRows;
 use crate::regression::trial::{Model, Role, Tolerance, Trial};
 use crate::regression::unknown::calibration;
 use arm_numerics::NumericsError;
@@ -125,7 +125,7 @@ pub fn identify<const N: usize>(
         if informed(&clusters) < FEWEST {
             clusters.fill(Condenser::new(unknowns.len()).finish());
         }
-        let series: Vec<&Rows> = fitted.iter().flat_map(|p| p.iter()).collect();
+        let series: Vec<&RegressionRows> = fitted.iter().flat_map(|p| p.iter()).collect();
         steps.push(step::<N>(
             &unknowns,
             own(model, &unknowns, joint),

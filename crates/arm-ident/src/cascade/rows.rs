@@ -2,13 +2,13 @@
 
 use super::unknowns::{is_dissipative, is_found};
 use crate::error::IdentError;
-use crate::regression::calibration::{Nearby, Prediction, influence as of_calibration};
+use crate::regression::calibration::{Nearby, PredictedForce, influence as of_calibration};
 use crate::regression::equation::gradient;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
 use crate::regression::measured_motion::{low_pass, slowest, speed, speed_noise};
 use crate::regression::preprocessing::{Pieces, filtered};
-use crate::regression::rows::Rows;
+use crate::regression::rows::RegressionRows;
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Imperfection, Moment, Source, Unknown};
 use arm_core::effect::{MAX_STATES, Motion, resisting_torque};
@@ -39,7 +39,7 @@ pub(super) struct Building<'a, const N: usize> {
     pub(super) kept: Model<N>,
     pub(super) memory: InternalStates<N>,
     /// Where imperfections of the measurement are among the unknowns.
-    pub(super) prediction: Option<Prediction<N>>,
+    pub(super) prediction: Option<PredictedForce<N>>,
     /// Samples that are built.
     pub(super) built: usize,
 }
@@ -79,7 +79,7 @@ impl<'a, const N: usize> Building<'a, N> {
             speed,
             moves,
             memory: InternalStates::new(&kept),
-            prediction: Prediction::of_unknowns(unknowns, &kept),
+            prediction: PredictedForce::of_unknowns(unknowns, &kept),
             kept,
             built: 0,
         })
@@ -100,13 +100,15 @@ impl<'a, const N: usize> Building<'a, N> {
     }
 
     /// The rows of the next samples.
-    pub(super) fn next(&mut self, count: usize) -> Rows {
+    pub(super) fn next(&mut self, count: usize) -> RegressionRows {
         let samples = self.built..self.built + count;
         self.built = samples.end;
-        Rows::of_samples::<N>(self.unknowns.len(), samples, |rows, k| self.sample(rows, k))
+        RegressionRows::of_samples::<N>(self.unknowns.len(), samples, |rows, k| {
+            self.sample(rows, k)
+        })
     }
 
-    pub(super) fn sample(&mut self, rows: &mut Rows, k: usize) {
+    pub(super) fn sample(&mut self, rows: &mut RegressionRows, k: usize) {
         let Self { model, trial, .. } = *self;
         let (kept, still) = (&self.kept, &self.still);
         let rest = Joints::<f64, N>::zeros();

@@ -3,7 +3,7 @@
 use crate::error::IdentError;
 use crate::inference::weighted_fit::root_mean_square;
 use crate::inference::weighted_fit::weighed;
-use crate::regression::rows::Rows;
+use crate::regression::rows::RegressionRows;
 use crate::regression::unknown::Unknown;
 use arm_numerics::least_squares::program::{Program, Status};
 use arm_numerics::statistics::autoregressive::effective_samples;
@@ -45,7 +45,7 @@ pub(super) fn informed(clusters: &[Factor]) -> usize {
 
 /// Rows of one joint over the stretches of a cluster.
 pub(super) fn condensed<const N: usize>(
-    cluster: &[(&Rows, core::ops::Range<usize>)],
+    cluster: &[(&RegressionRows, core::ops::Range<usize>)],
     joint: usize,
     p: usize,
 ) -> Result<Factor, IdentError> {
@@ -70,7 +70,7 @@ pub(super) fn condensed<const N: usize>(
 pub(super) fn step<const N: usize>(
     unknowns: &[Unknown],
     mut own: Vec<usize>,
-    (joint, mut clusters, series): (usize, Vec<Factor>, &[&Rows]),
+    (joint, mut clusters, series): (usize, Vec<Factor>, &[&RegressionRows]),
     x: &mut [f64],
 ) -> Result<Step, IdentError> {
     let mut data = merged(&clusters, unknowns.len())?;
@@ -160,7 +160,7 @@ pub(super) fn merged(factors: &[Factor], p: usize) -> Result<Factor, IdentError>
 
 /// Variance that the residual of one joint has for each *effective* sample \[N² m²\].
 pub(super) fn residual_variance<const N: usize>(
-    series: &[&Rows],
+    series: &[&RegressionRows],
     x: &[f64],
     joint: usize,
 ) -> Result<f64, IdentError> {

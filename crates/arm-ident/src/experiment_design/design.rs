@@ -4,7 +4,7 @@
 //! for its step), as trapezoids at two speeds come within a few percent of optimised Fourier series.
 
 use crate::error::IdentError;
-use crate::experiment_design::forecast::{Demand, Forecast, Question, Seen, Task, said};
+use crate::experiment_design::forecast::{Demand, MovementForecast, Question, Seen, Task, said};
 use crate::movement_limits::{Excess, Limit};
 use arm_core::{Joints, Shape};
 use arm_numerics::NumericsError;
@@ -59,7 +59,7 @@ pub struct Allowed<const N: usize> {
 
 /// Movements within what is allowed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Design<const N: usize> {
+pub struct OptimizedDesign<const N: usize> {
     /// The movements.
     pub tasks: Vec<Task<N>>,
     /// Pace of each, relative to the requested one.
@@ -67,7 +67,7 @@ pub struct Design<const N: usize> {
     /// For each the limit that it was slowed for, and the value at the requested pace; `None` where it is as fast as requested.
     pub slowed_for: Vec<Option<Excess>>,
     /// Forecast of the estimates.
-    pub forecast: Forecast,
+    pub forecast: MovementForecast,
 }
 
 /// Movements that make the worst relative standard deviation small.
@@ -80,9 +80,9 @@ pub fn design<const N: usize>(
     question: &Question<N>,
     allowed: &Allowed<N>,
     mut tried: impl FnMut(),
-) -> Result<Design<N>, IdentError> {
+) -> Result<OptimizedDesign<N>, IdentError> {
     let mut random = Normal::new(allowed.seed, 7);
-    let mut best: Option<(f64, Design<N>)> = None;
+    let mut best: Option<(f64, OptimizedDesign<N>)> = None;
     let mut current: Option<(f64, Vec<Task<N>>)> = None;
     let (mut step, mut failures) = (FIRST_STEP, 0);
     let mut refusal = IdentError::Numerics(NumericsError::TooFew {
@@ -145,7 +145,7 @@ fn excess(error: &IdentError) -> f64 {
 }
 
 /// The worst counts; the others break ties.
-fn score(forecast: &Forecast) -> f64 {
+fn score(forecast: &MovementForecast) -> f64 {
     let logs = forecast
         .predicted
         .iter()
@@ -159,7 +159,7 @@ fn fitting<const N: usize>(
     question: &Question<N>,
     tasks: Vec<Task<N>>,
     allowed: &Allowed<N>,
-) -> Result<Design<N>, IdentError> {
+) -> Result<OptimizedDesign<N>, IdentError> {
     let (mut slow, mut seen) = (Vec::new(), Vec::new());
     let (mut paces, mut slowed_for) = (Vec::new(), Vec::new());
     for task in tasks {
@@ -169,7 +169,7 @@ fn fitting<const N: usize>(
         paces.push(found.pace);
         slowed_for.push(found.slowed_for);
     }
-    Ok(Design {
+    Ok(OptimizedDesign {
         forecast: said(question, &slow, &seen)?,
         tasks: slow,
         paces,

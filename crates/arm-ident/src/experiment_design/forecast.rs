@@ -106,7 +106,7 @@ impl Predicted {
 
 /// Forecast of a set of movements: certainty of the parameters, and the load of the robot.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Forecast {
+pub struct MovementForecast {
     /// Base parameters and parameters of effects.
     pub predicted: Vec<Predicted>,
     /// Largest force on the arm \[N\].
@@ -123,7 +123,7 @@ pub struct Forecast {
     pub durations: Vec<f64>,
 }
 
-impl Forecast {
+impl MovementForecast {
     /// The worst relative standard deviation from the data alone.
     pub fn worst(&self) -> f64 {
         self.predicted
@@ -140,7 +140,7 @@ impl Forecast {
 pub fn forecast<const N: usize>(
     question: &Question<N>,
     tasks: &[Task<N>],
-) -> Result<Forecast, IdentError> {
+) -> Result<MovementForecast, IdentError> {
     let seen = tasks
         .iter()
         .map(|task| Seen::of(question, task))
@@ -153,7 +153,7 @@ pub(crate) fn said<const N: usize>(
     question: &Question<N>,
     tasks: &[Task<N>],
     seen: &[Seen<N>],
-) -> Result<Forecast, IdentError> {
+) -> Result<MovementForecast, IdentError> {
     let model = &question.model;
     let first: Vec<&Trial<N>> = seen.iter().map(|s| &s.trial).collect();
     let unknowns = unknowns(model, &question.tolerance, &first);
@@ -213,7 +213,7 @@ pub(crate) fn said<const N: usize>(
     }
     let most = |of: fn(&Demand) -> f64| seen.iter().map(|s| of(&s.demand)).fold(0.0, f64::max);
     let durations: Vec<f64> = seen.iter().map(|s| s.demand.duration).collect();
-    Ok(Forecast {
+    Ok(MovementForecast {
         predicted,
         force: most(|d| d.force),
         speed: most(|d| d.speed),

@@ -73,7 +73,7 @@ pub struct Forecast {
 
 impl Forecast {
     /// * `fitted` - the effects that were fitted, in their order
-    pub fn of(found: &forecast::Forecast, fitted: &[Effect<f64>]) -> Self {
+    pub fn of(found: &forecast::MovementForecast, fitted: &[Effect<f64>]) -> Self {
         let predictions = found.predicted.iter().map(|p| Prediction::of(p, fitted));
         Self {
             predictions: predictions.collect(),
@@ -145,7 +145,7 @@ pub struct Design {
 
 impl Design {
     /// * `fitted` - as of [`Forecast::of`]
-    pub fn of<const N: usize>(found: &design::Design<N>, fitted: &[Effect<f64>]) -> Self {
+    pub fn of<const N: usize>(found: &design::OptimizedDesign<N>, fitted: &[Effect<f64>]) -> Self {
         let movements = found.tasks.iter().map(|task| DesignedMovement {
             waypoints: task
                 .waypoints

@@ -6,7 +6,7 @@ use crate::inference::weighted_fit::{FIRST_GUESS, estimated, weighed};
 use crate::regression::equation::Building;
 use crate::regression::measured_motion::widened;
 use crate::regression::measured_motion::{candidates_of_measured, measured};
-use crate::regression::preprocessing::{LEAST_SHARE, Noise, Thinning};
+use crate::regression::preprocessing::{LEAST_SHARE, Thinning, TorqueCovariance};
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::Unknown;
 use crate::threads::parallel;
@@ -49,7 +49,7 @@ fn condensed<const N: usize>(
     unknowns: &[Unknown],
     (fit, cutoff): (&[&Trial<N>], f64),
 ) -> Result<Factor, IdentError> {
-    let noise = Noise::<N>::none();
+    let noise = TorqueCovariance::<N>::none();
     let mut condenser = Condenser::new(unknowns.len());
     let mut lengths = Vec::new();
     for trial in fit {

@@ -9,7 +9,7 @@ use crate::regression::equation::Building;
 use crate::regression::instrument::Instrument;
 use crate::regression::measured_motion::{measured, widened};
 use crate::regression::preprocessing::{
-    Noise, Pieces, filtered, repeat_deviations, residual, with_rest_columns,
+    Pieces, TorqueCovariance, filtered, repeat_deviations, residual, with_rest_columns,
 };
 use crate::regression::simulated_motion::simulated;
 use crate::regression::trial::{Model, Role, Trial};
@@ -152,7 +152,7 @@ impl<const N: usize> Task<'_, N> {
     /// How many times larger residuals are than what repeats differ by, as a geometric mean of the channels; none without repeats.
     fn excess(&self, prepared: &[Pieces], x: &[f64]) -> Option<f64> {
         let repeats = deviations(self.fit, &self.fitted(prepared));
-        let size = |values: &[Vec<f64>]| Noise::<N>::of_all(values).log_determinant();
+        let size = |values: &[Vec<f64>]| TorqueCovariance::<N>::of_all(values).log_determinant();
         let ratio = |repeats: &Vec<Vec<f64>>| size(&self.residuals(prepared, x)) - size(repeats);
         Some(&repeats)
             .filter(|repeats| !repeats.is_empty())
@@ -176,7 +176,7 @@ impl<const N: usize> Task<'_, N> {
             .map(|(u, x)| (x - u.mean) / u.sd)
             .map(|v| v * v)
             .sum();
-        samples as f64 * Noise::<N>::of_all(&residuals).log_determinant() + prior
+        samples as f64 * TorqueCovariance::<N>::of_all(&residuals).log_determinant() + prior
     }
 }
 

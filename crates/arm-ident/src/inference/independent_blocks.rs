@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use crate::error::IdentError;
 use crate::regression::preprocessing::Pieces;
-use crate::regression::rows::Rows;
+use crate::regression::rows::RegressionRows;
 use arm_numerics::NumericsError;
 use arm_numerics::statistics::sandwich_covariance::blocks;
 
@@ -60,7 +60,7 @@ pub(crate) fn clusters(lengths: &[Vec<usize>]) -> Result<Vec<Cluster>, IdentErro
 #[expect(clippy::type_complexity, reason = "a list of lists of stretches")]
 pub(crate) fn cluster_ranges<'a>(
     fit: &[&'a Pieces],
-) -> Result<Vec<Vec<(&'a Rows, Range<usize>)>>, IdentError> {
+) -> Result<Vec<Vec<(&'a RegressionRows, Range<usize>)>>, IdentError> {
     let length = |pieces: &&Pieces| pieces.iter().map(|rows| rows.samples.len()).collect();
     let lengths: Vec<Vec<usize>> = fit.iter().map(length).collect();
     let of_rows = |cluster: Cluster| {

@@ -32,7 +32,7 @@ pub enum MotionSource {
 }
 
 /// A fit that leaves this much more than repeats differ by, as a mean ratio of the channels' deviations, may be in a wrong minimum.
-const MISFIT: f64 = 2.0;
+const LARGEST_EXCESS: f64 = 2.0;
 
 /// Choices of an identification.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -182,7 +182,7 @@ impl<const N: usize> Task<'_, N> {
     /// Whether another way to the minimum can do no good: the robot holds every joint and the motion is known, or the fit ended between all bounds
     /// and leaves little more than repeats differ by.
     fn done(&self, found: &Settled<N>) -> bool {
-        let fits = found.excess.is_none_or(|excess| excess < MISFIT);
+        let fits = found.excess.is_none_or(|excess| excess < LARGEST_EXCESS);
         N <= HELD || (found.settled && fits && !found.at_bound)
     }
 

@@ -4,7 +4,7 @@ use crate::error::IdentError;
 use crate::inference::constraint::{binding_gradients, common_scale, program};
 use crate::inference::estimate::Explained;
 use crate::inference::independent_blocks::cluster_ranges;
-use crate::regression::preprocessing::{Noise, Pieces, residual};
+use crate::regression::preprocessing::{Pieces, TorqueCovariance, residual};
 use crate::regression::trial::Model;
 use crate::regression::unknown::{Source, Unknown};
 use arm_numerics::least_squares::outcome::Outcome;
@@ -52,9 +52,9 @@ pub(crate) fn weighted<const N: usize>(
             break;
         }
         let noise = if repeated {
-            Noise::<N>::of_repeats(deviations)?.at_least(&residuals)
+            TorqueCovariance::<N>::of_repeats(deviations)?.at_least(&residuals)
         } else {
-            Noise::of_residuals(&residuals)?
+            TorqueCovariance::of_residuals(&residuals)?
         };
         solved = solve(model, unknowns, fit, &noise, scale_free)?;
     }
@@ -77,7 +77,7 @@ pub(crate) fn first_solution<const N: usize>(
         .map(|r| residual(r, &x0))
         .collect();
     let level = torque.max(root_mean_square(rest.iter().flatten()));
-    let noise = Noise::<N>::even((FIRST_GUESS * level).max(f64::MIN_POSITIVE.sqrt()));
+    let noise = TorqueCovariance::<N>::even((FIRST_GUESS * level).max(f64::MIN_POSITIVE.sqrt()));
     Ok((solve(model, unknowns, fit, &noise, scale_free)?, level))
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn solve<const N: usize>(
     model: &Model<N>,
     unknowns: &[Unknown],
     fit: &[&Pieces],
-    noise: &Noise<N>,
+    noise: &TorqueCovariance<N>,
     scale_free: bool,
 ) -> Result<Solved, IdentError> {
     let p = unknowns.len();

@@ -17,7 +17,7 @@ use crate::regression::unknown::{Imperfection, Source, Unknown};
 /// That of the simulation where the motion is simulated. Else least squares of `Jᵀ F = B q̈ + C q̇ + G + R − τ − M` over the two
 /// components of the force; in a pose in which a component does no work (a stretched arm) that component is zero. Zero where the arm is
 /// not led by a force.
-pub(crate) struct Prediction<const N: usize> {
+pub(crate) struct PredictedForce<const N: usize> {
     memory: InternalStates<N>,
     near: Nearby,
     /// Samples of which the force is known.
@@ -34,7 +34,7 @@ pub(crate) struct Nearby {
     span: usize,
 }
 
-impl<const N: usize> Prediction<N> {
+impl<const N: usize> PredictedForce<N> {
     /// Before the first sample; none where no imperfection of the measurement is among the unknowns.
     pub fn of_unknowns(unknowns: &[Unknown], model: &Model<N>) -> Option<Self> {
         let is_calibration = |u: &Unknown| matches!(u.source, Source::Calibration(_));

@@ -6,10 +6,10 @@
 //! Where a joint rests, set-valued dry friction resists with whatever holds it: nothing follows from its row, which is zero there. The equation
 //! of every other row is exact, and a low-pass of both sides leaves it so.
 
-use crate::regression::calibration::{Nearby, Prediction, influence};
+use crate::regression::calibration::{Nearby, PredictedForce, influence};
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
-use crate::regression::rows::Rows;
+use crate::regression::rows::RegressionRows;
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Moment, Source, Unknown, spring};
 use arm_core::effect::{Effect, Motion, States, resisting_torque};
@@ -27,7 +27,7 @@ pub(crate) struct Building<'a, const N: usize> {
     /// The fitted effects, springs with an unknown rest angle at rest zero.
     pub(crate) regressed: Vec<Effect<f64>>,
     /// Where imperfections of the measurement are among the unknowns.
-    pub(crate) prediction: Option<Prediction<N>>,
+    pub(crate) prediction: Option<PredictedForce<N>>,
     /// Joints with set-valued dry friction.
     pub(crate) dry: [bool; N],
     /// Samples that are built.
@@ -48,13 +48,13 @@ impl<'a, const N: usize> Building<'a, N> {
             motion,
             memory: InternalStates::new(model),
             regressed: regressed(model, unknowns),
-            prediction: Prediction::of_unknowns(unknowns, model),
+            prediction: PredictedForce::of_unknowns(unknowns, model),
             dry: sticking(model),
             built: 0,
         }
     }
 
-    /// Columns of the rows: one for each unknown and, where some joint sticks, one of [`Rows::held`].
+    /// Columns of the rows: one for each unknown and, where some joint sticks, one of [`RegressionRows::held`].
     pub fn width(&self) -> usize {
         self.unknowns.len() + usize::from(self.dry.contains(&true))
     }
@@ -65,7 +65,7 @@ impl<'a, const N: usize> Building<'a, N> {
     }
 
     /// Takes what resting joints hold out of the right-hand side.
-    pub fn take_held(&self, rows: &mut Rows) {
+    pub fn take_held(&self, rows: &mut RegressionRows) {
         let Some(held) = rows.columns.get_mut(self.unknowns.len()) else {
             return;
         };
@@ -77,15 +77,16 @@ impl<'a, const N: usize> Building<'a, N> {
     }
 
     /// The rows of the next samples.
-    pub fn next(&mut self, count: usize) -> Rows {
+    pub fn next(&mut self, count: usize) -> RegressionRows {
         let samples = self.built..self.built + count;
         self.built = samples.end;
-        let mut rows = Rows::of_samples::<N>(self.width(), samples, |rows, k| self.sample(rows, k));
+        let mut rows =
+            RegressionRows::of_samples::<N>(self.width(), samples, |rows, k| self.sample(rows, k));
         self.take_held(&mut rows);
         rows
     }
 
-    fn sample(&mut self, rows: &mut Rows, k: usize) {
+    fn sample(&mut self, rows: &mut RegressionRows, k: usize) {
         let Self {
             model,
             unknowns,

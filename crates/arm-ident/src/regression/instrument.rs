@@ -3,7 +3,7 @@
 use crate::regression::equation::{Building, Sample, effect_value, value_of};
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
-use crate::regression::rows::Rows;
+use crate::regression::rows::RegressionRows;
 use crate::regression::sensitivity::{Course, HELD, Responses};
 use crate::regression::trial::{Model, Trial};
 use crate::regression::unknown::{Imperfection, Source, Unknown};
@@ -49,7 +49,7 @@ impl<'a, const N: usize> Instrument<'a, N> {
     }
 
     /// The rows of the next samples.
-    pub fn next(&mut self, count: usize) -> Rows {
+    pub fn next(&mut self, count: usize) -> RegressionRows {
         let mut rows = self.building.next(count);
         let Building {
             model,

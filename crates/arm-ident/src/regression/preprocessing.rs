@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::error::IdentError;
 use crate::regression::measured_motion::low_pass;
-use crate::regression::rows::Rows;
+use crate::regression::rows::RegressionRows;
 use crate::regression::trial::Trial;
 use arm_numerics::Condenser;
 use arm_numerics::error::check_least;
@@ -27,7 +27,7 @@ const STRETCH: usize = 4096;
 const REACHES: usize = 4;
 
 /// Rows after filtering and decimation, in pieces without a gap.
-pub type Pieces = Vec<Rows>;
+pub type Pieces = Vec<RegressionRows>;
 
 /// The common low-pass of a trial and the samples that are kept.
 pub(crate) struct Thinning {
@@ -64,8 +64,8 @@ impl Thinning {
         &self,
         end: usize,
         (piece, before): &mut (usize, usize),
-        room: impl Fn(&[usize]) -> Rows,
-    ) -> Vec<(usize, Rows)> {
+        room: impl Fn(&[usize]) -> RegressionRows,
+    ) -> Vec<(usize, RegressionRows)> {
         let mut list = Vec::new();
         while let Some(samples) = self.kept.get(*piece) {
             let rest = &samples[*before..];
@@ -91,8 +91,8 @@ impl Thinning {
     pub fn stream<const N: usize>(
         &self,
         unknowns: usize,
-        mut build: impl FnMut(usize) -> Rows,
-        mut take: impl FnMut(usize, Rows) -> Result<(), IdentError>,
+        mut build: impl FnMut(usize) -> RegressionRows,
+        mut take: impl FnMut(usize, RegressionRows) -> Result<(), IdentError>,
     ) -> Result<(), IdentError> {
         let stretch = STRETCH.max(REACHES * self.filter.reach());
         let mut smooth = BothWays::new(&self.filter, (unknowns + 1) * N);
@@ -104,7 +104,7 @@ impl Thinning {
             let last = left == 0;
             let from = smooth.given();
             let mut ready = self.upto(smooth.given_with(count, last), &mut next, |samples| {
-                Rows::zeros::<N>(unknowns, samples.to_vec())
+                RegressionRows::zeros::<N>(unknowns, samples.to_vec())
             });
             let raw = build(count);
             let columns = raw.columns.iter().chain([&raw.rhs]);
@@ -112,7 +112,7 @@ impl Thinning {
             smooth.push::<N>(&columns, last, |channel, values| {
                 let (u, j) = (channel / N, channel % N);
                 for (_, rows) in &mut ready {
-                    let Rows {
+                    let RegressionRows {
                         columns,
                         rhs,
                         samples,
@@ -156,10 +156,10 @@ pub fn filtered<const N: usize>(
     trial: &Trial<N>,
     cutoff: f64,
     unknowns: usize,
-    build: impl FnMut(usize) -> Rows,
+    build: impl FnMut(usize) -> RegressionRows,
 ) -> Result<Pieces, IdentError> {
     let thinning = Thinning::new(trial, cutoff)?;
-    let room = |n: &Vec<usize>| Rows {
+    let room = |n: &Vec<usize>| RegressionRows {
         columns: (0..unknowns)
             .map(|_| Vec::with_capacity(n.len() * N))
             .collect(),
@@ -214,7 +214,7 @@ fn kept_samples(valid: &[bool], margin: usize, step: usize) -> Vec<Vec<usize>> {
 /// The correlation of rows in time is treated by the clustered covariance; here it only lowers the weight against the
 /// prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise<const N: usize> {
+pub struct TorqueCovariance<const N: usize> {
     /// Lower triangular, row-major \[1/(N m)\].
     inverse: [[f64; N]; N],
 }
@@ -222,7 +222,7 @@ pub struct Noise<const N: usize> {
 /// Share of the largest variance that is added to every joint, so that no combination of torques is weighted beyond the accuracy of the model.
 pub(crate) const LEAST_SHARE: f64 = 1e-3;
 
-impl<const N: usize> Noise<N> {
+impl<const N: usize> TorqueCovariance<N> {
     /// The same in every joint \[N m\].
     pub fn even(sd: f64) -> Self {
         Self::from_covariance(&core::array::from_fn(|j| {
@@ -336,7 +336,7 @@ impl<const N: usize> Noise<N> {
     pub(crate) fn condense(
         &self,
         condenser: &mut Condenser,
-        rows: &Rows,
+        rows: &RegressionRows,
         range: core::ops::Range<usize>,
     ) -> Result<(), IdentError> {
         let width = rows.columns.len() + 1;
@@ -399,7 +399,7 @@ pub fn repeat_deviations<const N: usize>(repeats: &[&Pieces]) -> Option<Vec<Vec<
     }
     // What each measured at a sample, if it has it.
     let own = |pieces: &Pieces| -> BTreeMap<usize, [f64; N]> {
-        let each = |rows: &Rows| {
+        let each = |rows: &RegressionRows| {
             let at = |k: usize| from_fn(|j| rows.measured(k * N + j));
             let samples = rows.samples.iter().enumerate();
             samples.map(|(k, &i)| (i, at(k))).collect::<Vec<_>>()
@@ -433,7 +433,7 @@ pub fn repeat_deviations<const N: usize>(repeats: &[&Pieces]) -> Option<Vec<Vec<
 }
 
 /// Residual of rows at given parameters, joint-interleaved.
-pub fn residual(rows: &Rows, x: &[f64]) -> Vec<f64> {
+pub fn residual(rows: &RegressionRows, x: &[f64]) -> Vec<f64> {
     let mut out = rows.rhs.clone();
     for (column, &value) in rows.columns.iter().zip(x) {
         for (r, c) in out.iter_mut().zip(column) {
@@ -449,7 +449,7 @@ mod tests {
 
     /// A repeat of one joint that measures `value` at every kept sample.
     fn repeat(valid: &[bool], value: impl Fn(usize) -> f64) -> Pieces {
-        let rows = |samples: Vec<usize>| Rows {
+        let rows = |samples: Vec<usize>| RegressionRows {
             columns: Vec::new(),
             rhs: samples.iter().map(|&i| value(i)).collect(),
             samples,

@@ -6,7 +6,7 @@ use std::ops::Range;
 ///
 /// `columns[u][i * N + j]` belongs to unknown `u`, sample `i`, joint `j`; the right-hand side `rhs` is laid out alike.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rows {
+pub struct RegressionRows {
     /// One column for each unknown.
     pub columns: Vec<Vec<f64>>,
     /// Measured torque that the columns explain \[N m\].
@@ -19,7 +19,7 @@ pub struct Rows {
     pub held: Option<Vec<f64>>,
 }
 
-impl Rows {
+impl RegressionRows {
     /// Whether the row at a place in `rhs` is fitted.
     pub fn fits(&self, at: usize) -> bool {
         self.fits.as_ref().is_none_or(|fits| fits[at])

@@ -8,7 +8,7 @@ use arm_ident::IdentError;
 use arm_ident::inference::joint_method::identify;
 use arm_ident::regression::measured_motion::low_pass;
 use arm_ident::regression::preprocessing::filtered;
-use arm_ident::regression::rows::Rows;
+use arm_ident::regression::rows::RegressionRows;
 use arm_ident::regression::trial::Trial;
 use arm_numerics::NumericsError;
 
@@ -16,10 +16,10 @@ const RATE: f64 = 100.0;
 const CUTOFF: f64 = 5.0;
 
 /// Columns of two joints and a trial that is as long.
-fn raw(samples: usize) -> (Rows, Trial<2>) {
+fn raw(samples: usize) -> (RegressionRows, Trial<2>) {
     let mut noise = Noise::new(3);
     let mut column = || noise.slow(0.99, 2 * samples);
-    let rows = Rows {
+    let rows = RegressionRows {
         columns: (0..3).map(|_| column()).collect(),
         rhs: column(),
         samples: (0..samples).collect(),
@@ -34,13 +34,13 @@ fn raw(samples: usize) -> (Rows, Trial<2>) {
 }
 
 /// Gives the next rows of `all` at each call.
-fn part_by_part(all: &Rows) -> impl FnMut(usize) -> Rows + '_ {
+fn part_by_part(all: &RegressionRows) -> impl FnMut(usize) -> RegressionRows + '_ {
     let mut built = 0;
     move |count| {
         let samples = built..built + count;
         built += count;
         let part = |column: &Vec<f64>| column[2 * samples.start..2 * samples.end].to_vec();
-        Rows {
+        RegressionRows {
             columns: all.columns.iter().map(part).collect(),
             rhs: part(&all.rhs),
             samples: samples.collect(),

@@ -223,8 +223,9 @@ pub fn add(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<Fitted>()?;
     m.add_class::<GapResult>()?;
     m.add_class::<Screening>()?;
-    m.add("MISFIT", core::MISFIT)?;
+    m.add("LACK_OF_FIT", core::LACK_OF_FIT)?;
     m.add("TIE", core::TIE)?;
+    m.add("OPEN_GAP", core::OPEN_GAP)?;
     m.add("THRESHOLD", arm_gap::candidates::candidate::THRESHOLD)?;
     m.add_function(wrap_pyfunction!(verdict_of, m)?)?;
     m.add_function(wrap_pyfunction!(channel_names, m)?)?;

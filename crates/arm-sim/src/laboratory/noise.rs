@@ -42,7 +42,7 @@ impl Normal {
 
 /// Noise of one sensor channel, sample by sample: white, or coloured as a first-order autoregression.
 #[derive(Clone, Debug)]
-pub(crate) struct Noise {
+pub(crate) struct SensorNoise {
     normal: Normal,
     deviation: f64,
     /// Correlation of one sample with the next.
@@ -50,7 +50,7 @@ pub(crate) struct Noise {
     last: Option<f64>,
 }
 
-impl Noise {
+impl SensorNoise {
     /// * `deviation` - standard deviation of the noise, white or coloured
     /// * `correlation_time` - time in which the correlation falls to 1/e \[s\], zero for white noise
     pub fn new(normal: Normal, deviation: f64, correlation_time: f64, interval: f64) -> Self {

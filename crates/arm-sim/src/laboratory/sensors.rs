@@ -2,7 +2,7 @@
 
 use arm_core::{Joints, Reading};
 
-use crate::laboratory::noise::{Noise, Normal};
+use crate::laboratory::noise::{Normal, SensorNoise};
 use crate::{Experiment, Recording, SimulationError, cubic_weights};
 
 /// One channel of a sensor: noise, then quantisation, then saturation.
@@ -147,7 +147,7 @@ impl<const N: usize> Sensors<N> {
             channel.validate()?;
             let (deviation, time) = (channel.deviation, channel.correlation_time);
             let normal = Normal::new(self.seed, stream);
-            noises.push((channel, Noise::new(normal, deviation, time, interval)));
+            noises.push((channel, SensorNoise::new(normal, deviation, time, interval)));
         }
         let clock = Clock::of(&recording.time)?;
         if recording.force_on_arm.is_empty() {

@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..._armrs import TIE
+from ..._armrs import OPEN_GAP, TIE
 from ...catalogue import catalogue, title
 from ...formatting import digits, read_in, with_interval, with_unit
 
-OPEN = 1.5
-"""A channel is open as a whole where its gap exceeds so many times its floor."""
 _AS_REPEATS = 1.1
 """A channel whose gap exceeds its floor by a tenth at most is within the scatter of repeats; a wider one is stated with its factor."""
 _FAMILIES = {
@@ -80,12 +78,12 @@ def left(channel: Mapping[str, Any]) -> float | None:
 def still_open(result: Mapping[str, Any]) -> list[str]:
     """Return the channels whose gap on the test trials the named effects leave open, the widest first.
 
-    What the result lists as `open` counts; for a result without such a list the limit is `OPEN`.
+    What the result lists as `open` counts; for a result without such a list the limit is `OPEN_GAP`.
     """
     listed = result.get("open")
     if listed is None:
         pairs = [(name, left(g), g["floor"]) for name, g in result["gap"].items()]
-        names = [name for name, value, floor in pairs if value is not None and floor and value > OPEN * floor]
+        names = [name for name, value, floor in pairs if value is not None and floor and value > OPEN_GAP * floor]
     else:
         names = list(dict.fromkeys(entry["channel"] for entry in listed))
     return sorted(names, key=lambda name: -_times(result["gap"].get(name, {}), "last"))
@@ -104,7 +102,7 @@ def only_near(result: Mapping[str, Any]) -> bool:
     if result["verdict"] != "unexplained" or not result["effects"]:
         return False
     opened = still_open(result)
-    wide = [result["gap"][name] for name in opened if _times(result["gap"].get(name, {}), "after") > OPEN]
+    wide = [result["gap"][name] for name in opened if _times(result["gap"].get(name, {}), "after") > OPEN_GAP]
     shares = [share for channel in wide if (share := closed(channel)) is not None]
     return min(shares, default=1.0) < _CLOSES and _beyond(result, opened) == _NAMELESS
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import formatting
-from ..._armrs import MISFIT, TIE
+from ..._armrs import LACK_OF_FIT, TIE
 from ...formatting import digits, number, spread, with_interval
 from .. import sentences as common
 from ..tables import Table, smallest_effects
@@ -152,10 +152,10 @@ def left(result: Mapping[str, Any]) -> list[str]:
     for which, words in (("calibrated", "Calibrated model"), ("amended", "Model with the named effects")):
         lack = result["lack_of_fit"][which]
         if lack["ratio"] is not None and lack["z"] is not None and (which == "calibrated" or result["effects"]):
-            verdict = f"{'more' if lack['z'] >= MISFIT else 'no more'} than noise explains"
+            verdict = f"{'more' if lack['z'] >= LACK_OF_FIT else 'no more'} than noise explains"
             lines.append(
                 f"{words}, fit trials: the part of the residuals that repeats share has {digits(lack['ratio'])} times the variance of the "
-                f"part that differs between them. This is {verdict} ({_deviations(lack['z'])} standard deviations; limit {MISFIT:g})."
+                f"part that differs between them. This is {verdict} ({_deviations(lack['z'])} standard deviations; limit {LACK_OF_FIT:g})."
             )
     if not lines:
         lines.append(_UNTESTED)
@@ -208,8 +208,8 @@ def quick(result: Mapping[str, Any]) -> None:
         said = f"{len(worth)} effects each improve the fit; several may have one cause; {effect_name(worth[0])} explains most"
     noise = ""
     if z is not None and not math.isnan(z):
-        more = "more" if z >= MISFIT else "no more"
-        noise = f"; the calibrated model leaves {more} than noise ({_deviations(z)} standard deviations; limit {MISFIT:g})"
+        more = "more" if z >= LACK_OF_FIT else "no more"
+        noise = f"; the calibrated model leaves {more} than noise ({_deviations(z)} standard deviations; limit {LACK_OF_FIT:g})"
     print(f"{common.name(result)}{label}, a first look: {said}{noise}.\n")
     common.show("Gap on the test trials: root mean square of simulated minus measured", gap({**result, "effects": []}))
     if result["gap"]:
