@@ -1,4 +1,4 @@
-//! What the body of every function needs: references instead of pointers, and results that are finite.
+//! Checks that every function shares: pointers become references, and results must be finite.
 
 use arm_core::Joints;
 

@@ -1,4 +1,4 @@
-//! The torque that carries an arm that was identified elsewhere.
+//! Torques that carry an arm identified elsewhere.
 
 use core::mem::MaybeUninit;
 

@@ -1,4 +1,4 @@
-//! Movements: a sample of one, and paths through waypoints.
+//! Movements: samples, and paths through waypoints.
 
 use core::mem::MaybeUninit;
 

@@ -1,4 +1,4 @@
-//! What a call came to.
+//! Status codes that functions return.
 
 use arm_core::Invalid;
 

@@ -1,4 +1,4 @@
-//! Makes arms and their effects.
+//! Functions that create arms and their effects.
 
 use core::ffi::{CStr, c_char};
 

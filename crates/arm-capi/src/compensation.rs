@@ -1,4 +1,4 @@
-//! Makes the torque that carries an arm that was identified elsewhere.
+//! The function that creates the gravity compensation of an arm identified elsewhere.
 
 use arm_capi_online::armrs_status;
 use arm_capi_online::call::{given, numbers, place};

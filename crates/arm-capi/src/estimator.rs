@@ -1,4 +1,4 @@
-//! Makes estimators.
+//! Functions that create estimators.
 
 use arm_capi_online::armrs_status;
 use arm_capi_online::call::{ended, given, place};

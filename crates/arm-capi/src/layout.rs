@@ -1,4 +1,4 @@
-//! Sizes that the header asserts as well.
+//! Sizes of structs, which the header asserts as well.
 
 use crate::{
     ARMRS_JOINTS, armrs_decision, armrs_effect, armrs_load, armrs_motion, armrs_real, armrs_reason,

@@ -1,4 +1,4 @@
-//! Makes safety monitors.
+//! Functions that create safety monitors.
 
 use arm_capi_online::armrs_status::{self, *};
 use arm_capi_online::call::{given, place};

@@ -1,4 +1,4 @@
-//! Makes paths through waypoints.
+//! Functions that create paths through waypoints.
 
 use arm_capi_online::armrs_status::{self, *};
 use arm_capi_online::call::{finite, given, joints, numbers, place};

@@ -1,4 +1,4 @@
-//! What a function that makes something says of what it refuses.
+//! Messages of functions that refuse their arguments.
 
 use core::ffi::c_char;
 

@@ -1,4 +1,4 @@
-//! Makes the two-link robot that leads the hand.
+//! Functions that create the two-link robot that leads the hand.
 
 use arm_capi_online::armrs_status;
 use arm_capi_online::call::{numbers, place};

@@ -1,4 +1,4 @@
-//! Whether memory is still what it was.
+//! Checksum that shows whether memory has changed.
 
 use core::ffi::c_void;
 

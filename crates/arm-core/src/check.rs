@@ -1,4 +1,4 @@
-//! Checks of values handed to the core.
+//! Checks of values that the core is given.
 
 use crate::numeric::scalar::Real;
 use crate::{Invalid, Scalar};

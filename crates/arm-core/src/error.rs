@@ -1,4 +1,4 @@
-//! What can be wrong with a value handed to the core.
+//! Errors for values that the core refuses.
 
 use core::fmt;
 

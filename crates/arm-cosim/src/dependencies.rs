@@ -1,4 +1,4 @@
-//! What each unknown of a description depends on, from which an importer reads direct feedthrough.
+//! Dependencies of each unknown of a description, from which an importer reads direct feedthrough.
 
 use arm_sim::Port;
 

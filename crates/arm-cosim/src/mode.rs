@@ -1,4 +1,4 @@
-//! Where a slave is in its life.
+//! Modes in the life cycle of a slave.
 
 /// Where a slave is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

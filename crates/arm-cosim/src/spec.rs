@@ -1,4 +1,4 @@
-//! The arm as it travels: with everything that the simulation of it needs and nothing else.
+//! The specification of a simulated arm as it is stored in an FMU.
 
 use arm_core::effect::{Effect, KINDS, Kind, Place};
 use arm_core::{Chain, Contact, Invalid, Joints, Segment, Setup, sample_arms};

@@ -1,4 +1,4 @@
-//! Where an arm starts, found by looking at the arm.
+//! The start of a simulated arm: the handle at its tip, or the arm at rest in an equilibrium.
 
 use arm_sim::SimulationError;
 

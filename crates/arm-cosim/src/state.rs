@@ -1,4 +1,4 @@
-//! The state of a slave, to come back to it in this or another process.
+//! The saved state of a slave, which this or another process can restore.
 
 use crate::hash::fnv1a;
 use crate::mode::Mode;

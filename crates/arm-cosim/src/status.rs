@@ -1,4 +1,4 @@
-//! How a call ends, with the words of the FMI standard.
+//! Statuses of calls, in the words of the FMI standard.
 
 use arm_sim::SimulationError;
 

@@ -1,4 +1,4 @@
-//! Functions of Model Exchange that FMI 2.0 and 3.0 have in the same shape.
+//! Functions of Model Exchange that FMI 2.0 and 3.0 share.
 
 /// Writes out the functions of one version.
 macro_rules! exchange {

@@ -1,4 +1,4 @@
-//! One instance behind the pointer that an importer holds, and how every call on it ends.
+//! One instance behind the pointer that an importer holds, and the status of every call on it.
 
 use std::any::Any;
 use std::ffi::{CString, c_char, c_int, c_void};

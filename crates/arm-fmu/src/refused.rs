@@ -1,4 +1,4 @@
-//! Functions that the standards require in every library and that have no meaning here.
+//! Functions that the standards require and that this library refuses.
 
 /// Functions that the standard requires in every library, refused here.
 macro_rules! refused {

@@ -1,4 +1,4 @@
-//! The arm that travels in the folder `resources` of an FMU.
+//! The specification of the arm in the folder `resources` of an FMU.
 
 use std::fs::File;
 use std::io::Read;

@@ -1,4 +1,4 @@
-//! Reading small text files without trusting them.
+//! Reading of small text files that are not trusted.
 
 use std::fs::{self, File};
 use std::io::{ErrorKind, Read};

@@ -1,4 +1,4 @@
-//! How numbers and texts are shown in messages and written to files.
+//! Numbers and texts as they are shown in messages and written to files.
 
 /// The shortest text that reads back as the same number, always with a point or an exponent.
 pub(crate) fn shortest(value: f64) -> String {

@@ -1,4 +1,4 @@
-//! The one place that turns errors of the core into Python's.
+//! Conversion of errors of the core to Python's.
 
 use arm_core::{Invalid, Shown};
 use arm_gap::GapError;

@@ -1,4 +1,4 @@
-//! Plans: what movements will show, and movements that show much.
+//! Plans: forecasts of movements, and search for better ones.
 
 use arm_core::effect::Effect;
 use arm_core::{Chain, Joints, Shape};

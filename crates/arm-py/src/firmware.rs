@@ -1,4 +1,4 @@
-//! What `armrs export-c` needs of the core: the unknowns of a model, its calibration, and torques as the C interface gives them.
+//! Input of `armrs export-c`: the unknowns of a model, its calibration, and torques as the C interface gives them.
 
 use arm_core::effect::{ActsOn, Effect, Kind, MAX_STATES, Motion, applied};
 use arm_core::{Calibration, Chain, Equation, Invalid, Measured, Real};

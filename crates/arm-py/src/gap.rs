@@ -1,4 +1,4 @@
-//! The gap workflow: trials in, what the model lacks out.
+//! The gap workflow: search, screening, simulated trials and distances of alternatives.
 
 use std::sync::{Arc, Mutex};
 

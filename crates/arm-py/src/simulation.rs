@@ -1,4 +1,4 @@
-//! Simulation: a rig and how it is driven in, every column of the recording out, and what sensors read of it.
+//! Simulation of a rig under a drive: the recording, and the sensor readings of it.
 
 use std::ops::ControlFlow;
 

@@ -1,4 +1,4 @@
-//! What can be wrong with an experiment, and how a run can fail.
+//! Errors of experiments, and of runs.
 
 use arm_core::{Invalid, Shown};
 

@@ -1,4 +1,4 @@
-//! What the sensors of a model read instead of the truth, as one affine map, so that a device can take it back.
+//! Sensor readings as one affine map of the true values, and its inverse for devices.
 
 use core::array::from_fn;
 

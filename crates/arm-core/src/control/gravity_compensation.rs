@@ -1,4 +1,4 @@
-//! The torque that carries an arm: its weight and its passive moments, and what that torque may be wrong by.
+//! The torque that carries an arm, its weight and its passive moments, with an uncertainty.
 
 use crate::effect::{Motion, States};
 use crate::numeric::covariance::Covariance;

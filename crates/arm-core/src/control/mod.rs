@@ -1,4 +1,4 @@
-//! What a controller uses in every period: reference trajectories, corrected sensor readings, gravity compensation, safety monitor.
+//! Parts of a controller for every period: reference trajectories, corrected sensor readings, gravity compensation, safety monitor.
 
 pub(crate) mod calibration;
 pub(crate) mod gravity_compensation;

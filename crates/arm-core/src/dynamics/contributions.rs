@@ -1,4 +1,4 @@
-//! Every torque of the equation of motion by itself.
+//! The torques of the equation of motion, each by itself.
 
 use crate::dynamics::kinematics::{to_joint_torque, to_links};
 use crate::{

@@ -1,4 +1,4 @@
-//! What the dynamics need of an arm at every instant and does not change with it.
+//! Products of masses and lengths that the dynamics need at every instant.
 
 use core::array::from_fn;
 

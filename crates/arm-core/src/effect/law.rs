@@ -1,4 +1,4 @@
-//! What a kind of effect is.
+//! The interface of an effect: its description, its law, and its parameters.
 
 pub use super::place::Place;
 use super::prior::Prior;

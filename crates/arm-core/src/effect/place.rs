@@ -1,4 +1,4 @@
-//! Where an effect acts.
+//! Places at which effects act.
 
 /// Where an effect acts, and so what its index means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

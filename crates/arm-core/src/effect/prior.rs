@@ -1,4 +1,4 @@
-//! What is known of a kind before any data: what bodies and rigs have of it, and how it shows. How a search uses that stands there.
+//! Prior knowledge of each kind of effect: its parts, sizes, family, and the error of its law.
 
 use super::place::Place;
 

@@ -1,4 +1,4 @@
-//! The states that some effects carry (stretch of a Maxwell element, broken structure), integrated along a motion that is given.
+//! Internal states of effects (stretch of a Maxwell element, broken structure), integrated along a given motion.
 //!
 //! A simulation integrates them with the motion, by its own method. Everything that follows a motion measured or simulated before
 //! comes here: regression, gap analysis, online estimation, torques along a movement.

@@ -1,4 +1,4 @@
-//! One sensor channel: what is wrong with its values, and low-passes that also differentiate.
+//! One sensor channel: checks of its values, and low-passes that also differentiate.
 
 use core::array::from_fn;
 

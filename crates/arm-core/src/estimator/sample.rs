@@ -1,4 +1,4 @@
-//! What an estimator is given in one control period, and what became of it.
+//! The input of an estimator in one control period, and the status of each sample.
 
 use super::filtered_channel::Fault;
 use crate::Joints;

@@ -1,4 +1,4 @@
-//! The units of the work on a full window, of which a control period takes what it can afford.
+//! Division of the work on a full window into units for single control periods.
 
 /// What is left to do with a full window.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! How an estimator works, and what follows from it for one control period.
+//! Settings of an estimator, and the quantities of one control period that follow from them.
 
 use super::filtered_channel::Cutoff;
 use super::sample::Sample;

@@ -1,4 +1,4 @@
-//! The rows of a few control periods, added up.
+//! Rows of a few control periods, summed.
 
 use super::information::Row;
 use super::settings::Tuning;

@@ -1,4 +1,4 @@
-//! A covariance by its root.
+//! Covariances, stored as square roots.
 
 use core::array::from_fn;
 

@@ -1,4 +1,4 @@
-//! Several numbers side by side, one simulation a lane.
+//! Several numbers in SIMD lanes, one simulation in each.
 
 use core::array::from_fn;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};

@@ -1,4 +1,4 @@
-//! The number that the core computes with, and the only door to transcendental functions.
+//! The number type of the core, and the only access to transcendental functions.
 
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

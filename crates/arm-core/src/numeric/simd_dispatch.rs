@@ -1,4 +1,4 @@
-//! The widest vectors of the processor, found at run time.
+//! Choice of the widest vectors of the processor at run time.
 //!
 //! What goes through [`dispatch`] is compiled again for AVX2 and for AVX-512. Its operations and their order stay what they are and none are
 //! fused, so the bits are the same; only more numbers go through one instruction.

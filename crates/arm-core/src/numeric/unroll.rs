@@ -1,4 +1,4 @@
-//! Loops over joints, written out.
+//! Unrolled loops over joints.
 
 /// `for i in first..N`, or backwards, with the indices below four written out as constants.
 ///

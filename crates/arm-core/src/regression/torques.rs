@@ -1,4 +1,4 @@
-//! The torques of the equation of motion at values of the unknowns.
+//! Torques of the equation of motion at given values of the unknowns.
 
 use core::array::from_fn;
 

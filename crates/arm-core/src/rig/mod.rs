@@ -1,4 +1,4 @@
-//! What surrounds the arm: contact at the handle, robot, and what imperfections of a rig alter.
+//! Surroundings of the arm: contact at the handle, robot, and the quantities that imperfections of a rig alter.
 
 pub(crate) mod contact;
 pub(crate) mod placement;

@@ -1,4 +1,4 @@
-//! What effects outside the joints may alter: the rig before a run, and each reading of its sensors.
+//! Everything that effects outside the joints may alter: the rig before a run, and each reading of its sensors.
 
 use crate::{Chain, Contact, Invalid, Joints, Plane, Scalar, Segment};
 

@@ -1,4 +1,4 @@
-//! A law of a joint that the model leaves without one.
+//! A passive law of a joint that the model does not state.
 
 use arm_core::effect::Effect;
 

@@ -1,4 +1,4 @@
-//! Which trials repeat one movement.
+//! Groups of trials that repeat one movement.
 
 use std::sync::Arc;
 

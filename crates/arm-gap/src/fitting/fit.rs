@@ -1,4 +1,4 @@
-//! Fitting a hypothesis to the fit trials: Gauss and Newton's method, damped where it must be, near a simulated one.
+//! Fit of a hypothesis to the fit trials by Gauss and Newton's method, damped where necessary.
 
 use arm_numerics::{Cholesky, Matrix};
 
@@ -369,9 +369,9 @@ impl Precision {
     /// Widens what is known of some numbers by what a law may miss.
     ///
     /// * `of` - tells them
-    /// * `missed` - what the law may miss along one of them, in units of twice the log-likelihood
-    pub fn widen(&mut self, of: impl Fn(Target) -> bool, missed: f64) {
-        let wider = libm::sqrt(1.0 + missed.max(0.0));
+    /// * `law_error` - what the law may miss along one of them, in units of twice the log-likelihood
+    pub fn widen(&mut self, of: impl Fn(Target) -> bool, law_error: f64) {
+        let wider = libm::sqrt(1.0 + law_error.max(0.0));
         for (c, sd) in self.coordinates.iter().zip(&mut self.sd) {
             if of(c.target) {
                 *sd *= wider;
@@ -385,9 +385,9 @@ impl Precision {
     /// * `other` - with the other noise
     pub fn with_noise(&self, alone: &Self, other: Self) -> Self {
         let sd = (0..other.sd.len()).map(|i| {
-            let missed = self.sd[i] * self.sd[i] - alone.sd[i] * alone.sd[i];
+            let widened = self.sd[i] * self.sd[i] - alone.sd[i] * alone.sd[i];
             // Where both are infinite, the difference is none.
-            libm::sqrt(other.sd[i] * other.sd[i] + f64::max(missed, 0.0))
+            libm::sqrt(other.sd[i] * other.sd[i] + f64::max(widened, 0.0))
         });
         Self {
             sd: sd.collect(),

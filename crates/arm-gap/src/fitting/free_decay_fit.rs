@@ -1,4 +1,4 @@
-//! Free swings, fitted by simulation.
+//! Fit of free swings by simulation.
 //!
 //! Effects are selected by the equation of motion at every sample. The size of a loss is better estimated from the amplitudes
 //! of the oscillation: short runs are simulated from starts of their own, which are fitted with everything else (multiple shooting),

@@ -1,4 +1,4 @@
-//! What a fitted hypothesis leaves: more than repeats differ among themselves?
+//! Lack of fit of a fitted hypothesis, compared with the scatter between repeats.
 
 use crate::data::noise::{orthogonal, project_off};
 use crate::fitting::fit::FittedHypothesis;

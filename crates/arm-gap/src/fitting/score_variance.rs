@@ -1,4 +1,4 @@
-//! How much scores scatter between repeats, beside what the noise allows.
+//! Variance of scores between repeats, beyond that of the noise.
 
 use std::sync::Arc;
 

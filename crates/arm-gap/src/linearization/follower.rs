@@ -1,4 +1,4 @@
-//! A change of a run that is not small, followed step by step.
+//! Response of a run to a change that is not small, integrated step by step.
 //!
 //! The scheme of the linearised run with a nonlinear equation in every step. What it gives is the run itself and, on top, what two
 //! coarse solutions differ by, so that their common error drops out.

@@ -1,4 +1,4 @@
-//! Responses of a led arm to small changes, along a run that is linearised.
+//! Responses of a led arm to small changes, along a linearised run.
 //!
 //! A change of the rig, an effect or the handle's path leaves a residual torque in the equation of motion of the run. The arm responds as a
 //! linear system with coefficients that follow the run. A hundred candidates cost less than one simulation each.

@@ -1,4 +1,4 @@
-//! The hypothesis from which small changes are computed.
+//! The hypothesis that small changes are measured from.
 
 use std::sync::OnceLock;
 

@@ -1,4 +1,4 @@
-//! The equation of motion of a led arm at one instant: what is left over of it, and the force that moves the arm.
+//! The equation of motion of a led arm at one instant: its residual, and the force that moves the arm.
 
 use arm_core::effect::{Effect, Motion, Place, States, dry_friction, resisting_besides_dry};
 use arm_core::{

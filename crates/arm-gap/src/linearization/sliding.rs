@@ -1,5 +1,6 @@
-//! Dry friction that obeys its law at the end of a step, for an equation of motion that is linear: a linear complementarity problem,
-//! solved by principal pivoting (Murty 1974; Moreau 1988 for the step).
+//! Dry friction at the end of a step of a linear equation of motion, a linear complementarity problem.
+//!
+//! It is solved by principal pivoting (Murty 1974; Moreau 1988 for the step).
 
 use arm_core::Joints;
 use nalgebra::SMatrix;

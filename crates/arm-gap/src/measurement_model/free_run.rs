@@ -1,4 +1,4 @@
-//! A rig without a robot, simulated: the angles of an arm that swings freely, or that its motors' measured torques drive.
+//! Simulation of a rig without a robot: the angles of an arm that swings freely, or that its motors' measured torques drive.
 //!
 //! Nothing measured enters but where it starts, and the torques. A free swing runs from its first second to the end of the
 //! trial. A driven arm does not: small errors of torques add up to any angle, so that it starts anew every second.

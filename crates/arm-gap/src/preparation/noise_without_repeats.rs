@@ -1,4 +1,4 @@
-//! The noise of a data set without repeats.
+//! Estimation of the noise of a session without repeats.
 
 use arm_numerics::Matrix;
 

@@ -1,4 +1,4 @@
-//! A session made ready: samples at rest are left out, and the noise is measured.
+//! Preparation of a session: leaves out samples at rest, and measures the noise.
 
 use crate::GapError;
 use crate::data::noise::NoiseModel;

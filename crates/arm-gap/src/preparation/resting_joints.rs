@@ -1,4 +1,4 @@
-//! Samples at which joints with dry friction rest: static friction is unknown there, so that fewer force components are compared.
+//! Samples at which joints with dry friction rest. Static friction is unknown there, so that fewer force components are compared.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The model with the fitted changes.
+//! The model with its fitted changes.
 
 use arm_model::{Contact, Effect, Joint, Model, Refused, Robot, Segment};
 use serde::Serialize;

@@ -1,4 +1,4 @@
-//! Effects that were not named: the smallest size that the data would have shown, and the steps of the search.
+//! Detection limits of effects that were not named, and the steps of the search.
 
 use arm_core::effect::Effect;
 use serde::Serialize;
@@ -162,7 +162,7 @@ pub struct SearchStep {
 }
 
 impl SearchStep {
-    pub(super) fn of(step: &search_state::SearchRound) -> Self {
+    pub(super) fn of(step: &search_state::SearchStep) -> Self {
         let place = |c: &Candidate| placed(c.effect.kind, c.effect.index);
         let tried = step.tried.iter().map(|(members, gain)| Tried {
             effects: members.iter().map(place).collect(),

@@ -1,4 +1,4 @@
-//! The named effects, their alternatives, and movements that distinguish these.
+//! Missing effects, their alternatives, and movements that distinguish these.
 
 use arm_core::effect::{Effect as CoreEffect, Kind, Place as ActsOn};
 use arm_model::Effect;
@@ -216,7 +216,7 @@ impl Missing {
             let start = || Value::of(start, None, "s", (0.0, 0.0));
             parameters.entry("start".to_owned()).or_insert_with(start);
         }
-        let rivals = one.rivals.iter().map(|(effect, worse)| {
+        let alternatives = one.alternatives.iter().map(|(effect, worse)| {
             Alternative::new(effect, "swings these channels as much", *worse, f64::NAN)
         });
         let explained = one.gain + finding.calibrated.cost - finding.amended.cost;
@@ -225,7 +225,7 @@ impl Missing {
             share: one.gain / explained,
             trial: trial.map(|t| t.file.clone()),
             span: trial.map(|t| (start, at_most(end, t.end))),
-            ..Self::new(effect, parameters, rivals.collect())
+            ..Self::new(effect, parameters, alternatives.collect())
         }
     }
 

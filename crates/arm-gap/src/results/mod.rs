@@ -1,5 +1,6 @@
-//! What a session came to, in the terms of files and reports: kinds with joints from 1 and channels by name, values with units and
-//! intervals, gaps in root mean square, the verdict. One type for Rust, Python and JSON.
+//! The results of a session in the terms of files and reports. One type for Rust, Python and JSON.
+//!
+//! Kinds have joints from 1 and channels by name, values have units and intervals, gaps are root mean squares.
 
 mod absorbed;
 mod amended;

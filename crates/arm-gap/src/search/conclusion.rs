@@ -1,4 +1,4 @@
-//! What a search came to.
+//! The conclusion of a search: effects, precision, lack of fit and detection limits.
 
 use arm_core::effect::{Effect, Place};
 
@@ -12,7 +12,7 @@ use crate::prepared_session::PreparedSession;
 use crate::search::trial_specific_effects::TrialSpecificEffects;
 use crate::selection::model_selection::MissingEffect;
 use crate::selection::passive_base::BaseLaw;
-use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, SearchState, Settled};
+use crate::selection::search_state::{DetectionLimit, Progress, SearchState, SearchStep, Settled};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 
@@ -30,7 +30,7 @@ pub struct Finding<const N: usize> {
     /// The calibrated and the amended model as they are in each trial; see [`crate::trial_specific::in_trial`].
     pub in_trials: [Vec<Hypothesis<N>>; 2],
     /// Rounds of the search.
-    pub search_trace: Vec<SearchRound>,
+    pub search_trace: Vec<SearchStep>,
     /// How well the amended model is known.
     pub precision: Precision,
     /// Lack of fit of the calibrated and of the amended model.
@@ -261,19 +261,22 @@ fn widened<const N: usize>(
 ) -> Precision {
     let mut precision = alone.clone();
     for one in named {
-        let missed = one.gain * amended.asked[one.slot].kind().prior().squared_law_error;
+        let law_error = one.gain * amended.asked[one.slot].kind().prior().squared_law_error;
         let is_own = |t| matches!(t, Target::Named(own, _) if own == one.slot);
-        precision.widen(is_own, Precision::ALONG * missed);
+        precision.widen(is_own, Precision::ALONG * law_error);
         let joint = joint_of(&amended.hypothesis, Target::Named(one.slot, 0));
         let is_beside = |t| joint.is_some() && joint_of(&amended.hypothesis, t) == joint;
-        precision.widen(|t| is_beside(t) && !is_own(t), Precision::BESIDE * missed);
+        precision.widen(
+            |t| is_beside(t) && !is_own(t),
+            Precision::BESIDE * law_error,
+        );
     }
     for law in base {
         let known = first + law.base;
-        let missed = law.gain * law.question.kind().prior().squared_law_error;
+        let law_error = law.gain * law.question.kind().prior().squared_law_error;
         precision.widen(
             |t| matches!(t, Target::Known(own, _) if own == known),
-            Precision::ALONG * missed,
+            Precision::ALONG * law_error,
         );
     }
     precision

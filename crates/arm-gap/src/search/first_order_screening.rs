@@ -1,4 +1,4 @@
-//! Screening before the search: the effect of calibration, and what each kind of the catalogue would explain to first order.
+//! First-order screening: the effect of calibration, and the gain of each candidate alone.
 
 use arm_core::effect::Effect;
 

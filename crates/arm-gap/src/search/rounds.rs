@@ -1,4 +1,4 @@
-//! The search for missing effects: test the whole catalogue, extend choices by a beam search, converge by simulation, go back.
+//! The rounds of the search: score tests of the catalogue, beam search, convergence by simulation, comparison with alternatives.
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
@@ -12,7 +12,7 @@ use crate::search::conclusion::Finding;
 use crate::search::trial_specific_effects::TrialSpecificEffects;
 use crate::selection::model_selection::{MissingEffect, mimicked_by_any};
 use crate::selection::score_test::{Choice, ScoreTest};
-use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, SearchState, Settled};
+use crate::selection::search_state::{DetectionLimit, Progress, SearchState, SearchStep, Settled};
 
 /// Most effects that are named.
 const MOST: usize = 6;
@@ -315,7 +315,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         state: &SearchState<'a, N>,
         (library, score_test, room): (&Library, &ScoreTest, usize),
-    ) -> Option<(Settled<'a, N>, SearchRound)> {
+    ) -> Option<(Settled<'a, N>, SearchStep)> {
         let current = &state.current;
         // Less than every effect must explain need not be converged.
         let explained = state.calibrated.cost - current.cost;
@@ -370,7 +370,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         worthy.sort_by(|a, b| b.0.total_cmp(&a.0));
         // A solution that can be followed but not simulated is refused.
         converged.worthy.into_iter().find_map(|(_, better)| {
-            let step = SearchRound {
+            let step = SearchStep {
                 tried: converged.tried.clone(),
                 before: current.cost,
                 after: better.cost,

@@ -1,4 +1,4 @@
-//! Effects that differ between trials: rhythms, from the differences of repeats, and disturbances of single trials.
+//! Trial-specific effects that the search sets aside: rhythms, from the differences of repeats, and disturbances of single trials.
 
 use std::sync::Arc;
 

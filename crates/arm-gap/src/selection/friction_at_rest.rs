@@ -1,4 +1,4 @@
-//! Dry friction at rest: it sticks, or it creeps below some speed. Whole trials decide, rest included.
+//! Choice between dry friction that sticks and dry friction that creeps at rest, by whole trials.
 
 use arm_core::effect::Kind;
 

@@ -1,4 +1,4 @@
-//! The verdict's test on the test trials: does what a model leaves of each channel exceed what repeats differ by?
+//! The verdict's test on the test trials: compares the residual of each channel with the scatter between repeats.
 
 /// What a model leaves of one trial.
 #[derive(Clone, Debug)]

@@ -1,4 +1,4 @@
-//! How well new movements would distinguish two explanations.
+//! Expected discrimination between two explanations by new movements.
 
 use arm_core::effect::Effect;
 use arm_ident::regression::trial::Trial;
@@ -21,30 +21,30 @@ pub struct Discrimination<'a, const N: usize> {
     /// The session with the named effect.
     named: Hypothesis<N>,
     /// `None` for one that the trials that were made do not show.
-    rivals: Vec<Option<Rival<N>>>,
-    /// Distances from the measured trials, for every rival.
+    alternatives: Vec<Option<AlternativeHypothesis<N>>>,
+    /// Distances from the measured trials, for every alternative.
     made: Vec<Vec<Cluster>>,
 }
 
 /// Another effect in the place of the named one.
-struct Rival<const N: usize> {
+struct AlternativeHypothesis<const N: usize> {
     hypothesis: Hypothesis<N>,
     /// What is free in it.
     coordinates: Vec<Coordinate>,
 }
 
 impl<'a, const N: usize> Discrimination<'a, N> {
-    /// Between a named effect and its rivals, on the fit trials of a session.
+    /// Between a named effect and its alternatives, on the fit trials of a session.
     ///
     /// * `prepared` - its session has everything as known effects but the named one
-    /// * `rivals` - effects as they fit best, and which of their parameters are free
+    /// * `alternatives` - effects as they fit best, and which of their parameters are free
     ///
     /// # Errors
     /// [`GapError`] where the model cannot be simulated.
     pub fn new(
         mut prepared: PreparedSession<'a, N>,
         named: Effect<f64>,
-        rivals: &[(Effect<f64>, Vec<usize>)],
+        alternatives: &[(Effect<f64>, Vec<usize>)],
     ) -> Result<Self, GapError> {
         let without = prepared.session.given();
         let given = prepared.linearize(&without)?;
@@ -53,13 +53,13 @@ impl<'a, const N: usize> Discrimination<'a, N> {
             hypothesis.named.push(effect);
             hypothesis
         };
-        let rivals: Vec<Option<Rival<N>>> = rivals
+        let alternatives: Vec<Option<AlternativeHypothesis<N>>> = alternatives
             .iter()
             .map(|(effect, free)| {
                 let mut candidate = Candidate::again(&prepared, &given, *effect, free)?;
                 // Only distances that the data determine count.
                 candidate.expected.clear();
-                Some(Rival {
+                Some(AlternativeHypothesis {
                     hypothesis: with(*effect),
                     coordinates: candidate.coordinates(without.named.len(), effect),
                 })
@@ -67,11 +67,11 @@ impl<'a, const N: usize> Discrimination<'a, N> {
             .collect();
         let named = with(named);
         let point = rested(&mut prepared, &named)?;
-        let made = clusters(&rivals, &prepared, &point)?;
+        let made = clusters(&alternatives, &prepared, &point)?;
         Ok(Self {
             prepared,
             named,
-            rivals,
+            alternatives,
             made,
         })
     }
@@ -81,15 +81,15 @@ impl<'a, const N: usize> Discrimination<'a, N> {
         &self.prepared
     }
 
-    /// For every rival the distance between what it and the named effect would show, in standard deviations of the noise,
-    /// the rival and everything that was never exact refitted to first order: by the trials that were made alone, or with a
-    /// planned one more. NaN for a rival that the trials that were made do not show.
+    /// For every alternative the distance between what it and the named effect would show, in standard deviations of the noise,
+    /// the alternative and everything that was never exact refitted to first order: by the trials that were made alone, or with a
+    /// planned one more. NaN for an alternative that the trials that were made do not show.
     ///
     /// # Errors
     /// [`GapError`] for a movement that cannot be simulated.
     pub fn distances(&self, planned: Option<&Trial<N>>) -> Result<Vec<f64>, GapError> {
         let more = match planned {
-            None => vec![Vec::new(); self.rivals.len()],
+            None => vec![Vec::new(); self.alternatives.len()],
             Some(trial) => {
                 let session = Session {
                     trials: vec![trial.clone()],
@@ -99,31 +99,32 @@ impl<'a, const N: usize> Discrimination<'a, N> {
                 let mut prepared =
                     PreparedSession::with_noise(&session, self.prepared.noise.of_others(), 1)?;
                 let point = rested(&mut prepared, &self.named)?;
-                clusters(&self.rivals, &prepared, &point)?
+                clusters(&self.alternatives, &prepared, &point)?
             }
         };
-        let each = self.rivals.iter().zip(self.made.iter().zip(&more));
+        let each = self.alternatives.iter().zip(self.made.iter().zip(&more));
         Ok(each
-            .map(|(rival, (made, more))| match rival {
-                Some(rival) => {
-                    self.distance(rival, &made.iter().chain(more).cloned().collect::<Vec<_>>())
-                }
+            .map(|(alternative, (made, more))| match alternative {
+                Some(alternative) => self.distance(
+                    alternative,
+                    &made.iter().chain(more).cloned().collect::<Vec<_>>(),
+                ),
                 None => f64::NAN,
             })
             .collect())
     }
 
-    fn distance(&self, rival: &Rival<N>, clusters: &[Cluster]) -> f64 {
+    fn distance(&self, alternative: &AlternativeHypothesis<N>, clusters: &[Cluster]) -> f64 {
         let mut coordinates = self.prepared.session.nuisances();
-        coordinates.extend(&rival.coordinates);
-        let mut normal = Normal::new(clusters, &priors(&rival.hypothesis, &coordinates));
-        regularise(&mut normal.gram, &rival.hypothesis, &coordinates);
+        coordinates.extend(&alternative.coordinates);
+        let mut normal = Normal::new(clusters, &priors(&alternative.hypothesis, &coordinates));
+        regularise(&mut normal.gram, &alternative.hypothesis, &coordinates);
         let usable: Vec<usize> = (0..coordinates.len())
             .filter(|&i| normal.gram[(i, i)] > 0.0)
             .collect();
         let bounds = |i: usize| {
             let c = &coordinates[usable[i]];
-            let value = rival.hypothesis.get(c.target);
+            let value = alternative.hypothesis.get(c.target);
             (c.lower - value, c.upper - value)
         };
         let explained = solve(&normal.gram, &normal.score, &usable, &bounds);
@@ -144,21 +145,22 @@ fn rested<'a, const N: usize>(
     Ok(point)
 }
 
-/// For every rival what the named effect shows beyond it on the fit trials of a study, beside the responses to all that may be
+/// For every alternative what the named effect shows beyond it on the fit trials of a session, beside the responses to all that may be
 /// refitted.
 fn clusters<const N: usize>(
-    rivals: &[Option<Rival<N>>],
+    alternatives: &[Option<AlternativeHypothesis<N>>],
     prepared: &PreparedSession<N>,
     point: &LinearizationPoint<N>,
 ) -> Result<Vec<Vec<Cluster>>, GapError> {
-    rivals
+    alternatives
         .iter()
-        .map(|rival| {
-            let Some(rival) = rival else {
+        .map(|alternative| {
+            let Some(alternative) = alternative else {
                 return Ok(Vec::new());
             };
-            let own = prepared.responses_at(point, &rival.hypothesis, &rival.coordinates)?;
-            let left = prepared.residuals(point, &rival.hypothesis)?;
+            let own =
+                prepared.responses_at(point, &alternative.hypothesis, &alternative.coordinates)?;
+            let left = prepared.residuals(point, &alternative.hypothesis)?;
             let shown: Vec<Channels> = std::iter::zip(&left, &point.residuals)
                 .map(|(a, b)| difference(a, b))
                 .collect();

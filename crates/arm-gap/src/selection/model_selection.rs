@@ -1,4 +1,4 @@
-//! What a named effect is worth: without it, against what could stand in its place, and at the price of its freedom.
+//! Selection among effects: the gain of each, its alternatives, and the price of its parameters.
 
 use std::cmp::Ordering;
 
@@ -26,9 +26,9 @@ const OF_WHAT_IS_LEFT: f64 = 0.2;
 /// An effect that explains as much but for this (in units of twice the log-likelihood) is an alternative.
 pub(crate) const TIE: f64 = 10.0;
 /// Alternatives that are converged by simulation for each named effect.
-const RIVALS: usize = 5;
+const CONVERGED_ALTERNATIVES: usize = 5;
 /// Share of what a named effect gains that another must gain to first order to be converged in its place.
-const RIVAL: f64 = 0.6;
+const LEAST_ALTERNATIVE_GAIN: f64 = 0.6;
 /// Times that an alternative may take the place of a named effect where it is hardly better,
 const EXCHANGES: usize = 4;
 /// and where it explains more by a tie or more: each time less is left, so that this ends by itself.
@@ -96,7 +96,7 @@ pub struct FittedAlternative {
 }
 
 /// An alternative, fitted.
-pub(crate) struct Rival<const N: usize> {
+pub(crate) struct ConvergedAlternative<const N: usize> {
     pub alternative: FittedAlternative,
     pub fitted: FittedHypothesis<N>,
 }
@@ -277,18 +277,18 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 )?;
                 let gain = fitted.asked[slot].gained.min(f64::MAX);
-                let rivals = match &library {
+                let alternatives = match &library {
                     // Where the run cannot be followed without it, its gain is unknown.
                     Some(library) if less.cost.is_finite() => {
                         let place = (slot, less, entry.as_ref());
-                        let found = self.rivals(&fitted, place, (&point, library), scale);
+                        let found = self.alternatives(&fitted, place, (&point, library), scale);
                         found.unwrap_or_default()
                     }
                     _ => Vec::new(),
                 };
                 // A shape that is refined may explain the error of the law of another one.
                 let bent = self.mimicked_beside((&fitted, slot, less), &[], &point);
-                let better = rivals.iter().find(|r| {
+                let better = alternatives.iter().find(|r| {
                     let clear = r.alternative.worse < -TIE;
                     exchanges < if clear { CLEAR_EXCHANGES } else { EXCHANGES }
                         && self.takes_over(
@@ -316,7 +316,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     p_value: (asked * chance).min(1.0),
                     gain: gain / scale,
                     share: 0.0,
-                    alternatives: self.ties(rivals, candidate, gain / scale),
+                    alternatives: self.ties(alternatives, candidate, gain / scale),
                 });
             }
             return Ok((fitted, point, named));
@@ -326,11 +326,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Those of the others that explain the data as well as what gained so much.
     pub(crate) fn ties(
         &self,
-        rivals: Vec<Rival<N>>,
+        alternatives: Vec<ConvergedAlternative<N>>,
         own: &Candidate,
         gain: f64,
     ) -> Vec<FittedAlternative> {
-        let all = rivals.into_iter().map(|r| r.alternative);
+        let all = alternatives.into_iter().map(|r| r.alternative);
         all.filter(|a| a.worse <= self.tie(own, gain)).collect()
     }
 
@@ -351,11 +351,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// what sensors and a rigid model get wrong.
     pub(crate) fn takes_over(
         &self,
-        rival: &FittedAlternative,
+        alternative: &FittedAlternative,
         (own, gain): (&Candidate, f64),
         bent: f64,
     ) -> bool {
-        /// Units of twice the log-likelihood by which a rival must beat its handicap: two laws that show the same must not take
+        /// Units of twice the log-likelihood by which a alternative must beat its handicap: two laws that show the same must not take
         /// each other's place in turn.
         const BETTER: f64 = 0.05;
         let shapes = |c: &Candidate| self.price_of_shapes(std::slice::from_ref(c));
@@ -363,16 +363,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let place = self.session.kinds().position(|k| k == c.kind());
             (c.kind().info().parameters.len(), place)
         };
-        let handicap = match plain(&rival.candidate).cmp(&plain(own)) {
-            _ if self.repeated && own.shapes() > rival.candidate.shapes() => {
-                f64::max(shapes(own) - shapes(&rival.candidate), bent)
+        let handicap = match plain(&alternative.candidate).cmp(&plain(own)) {
+            _ if self.repeated && own.shapes() > alternative.candidate.shapes() => {
+                f64::max(shapes(own) - shapes(&alternative.candidate), bent)
             }
-            _ if self.repeated => shapes(own) - shapes(&rival.candidate),
+            _ if self.repeated => shapes(own) - shapes(&alternative.candidate),
             Ordering::Less => self.tie(own, gain),
             Ordering::Equal => 0.0,
             Ordering::Greater => -self.tie(own, gain),
         };
-        rival.worse < handicap - BETTER
+        alternative.worse < handicap - BETTER
     }
 
     /// Other effects in the place of one, fitted, the best first.
@@ -380,13 +380,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Two criteria select another effect: what it explains once all is refitted without the named one, and how well it replaces
     /// that one where all is as it was fitted. The first fails where the refit is at its bounds, the second where much
     /// else changes with the exchange.
-    pub(crate) fn rivals(
+    pub(crate) fn alternatives(
         &self,
         fitted: &FittedHypothesis<N>,
         (slot, less, entry): (usize, &FittedHypothesis<N>, Option<&LibraryEntry>),
         (point, library): (&LinearizationPoint<N>, &Library),
         scale: f64,
-    ) -> Result<Vec<Rival<N>>, GapError> {
+    ) -> Result<Vec<ConvergedAlternative<N>>, GapError> {
         let own = &fitted.asked[slot];
         let refitted = ScoreTest::new(self, less, point, library)?;
         let others = others(own, &less.asked, library);
@@ -419,7 +419,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let both = choice.into_iter().chain(stand_in);
             // The members of a family are held against each other whatever they show to first order: their shapes are refined first.
             let is_kin = own.is_of_family_in_joint(&library.candidates[c].effect);
-            singles.extend(both.filter(|(part, ..)| is_kin || *part > RIVAL));
+            singles.extend(both.filter(|(part, ..)| is_kin || *part > LEAST_ALTERNATIVE_GAIN));
         }
         singles.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The best of each effect.
@@ -427,35 +427,37 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut best: Vec<&(f64, Choice, (&ScoreTest, &FittedHypothesis<N>))> = Vec::new();
         for single in &singles {
             let effect = &candidate(&single.1).effect;
-            if best.len() < RIVALS && !best.iter().any(|b| candidate(&b.1).is_same_effect(effect)) {
+            if best.len() < CONVERGED_ALTERNATIVES
+                && !best.iter().any(|b| candidate(&b.1).is_same_effect(effect))
+            {
                 best.push(single);
             }
         }
-        let rival = |place: usize| {
+        let converged = |place: usize| {
             let (_, choice, (score_test, from)) = best[place];
             let member = choice.members[0];
             let mut asked = candidate(choice).clone();
             (asked.price, asked.spread) = (score_test.price[member], score_test.spread[member]);
             let choice = (std::slice::from_ref(&asked), choice.coefficients.as_slice());
-            let rival = self.attempt(from, choice, point)?;
-            let effect = rival.hypothesis.named.last().copied();
+            let again = self.attempt(from, choice, point)?;
+            let effect = again.hypothesis.named.last().copied();
             let effect = effect.filter(|effect| !asked.is_plainer(effect))?;
-            let worse = (rival.cost - fitted.cost) / scale + asked.price - own.price;
+            let worse = (again.cost - fitted.cost) / scale + asked.price - own.price;
             let likeness = entry.map_or(0.0, |t| score_test.likeness(t.place, member));
-            Some(Rival {
+            Some(ConvergedAlternative {
                 alternative: FittedAlternative {
                     candidate: asked,
                     effect,
                     worse,
                     likeness,
                 },
-                fitted: rival,
+                fitted: again,
             })
         };
-        let rivals = self.parallel(best.len(), rival);
-        let mut rivals: Vec<_> = rivals.into_iter().flatten().collect();
-        rivals.sort_by(|a, b| a.alternative.worse.total_cmp(&b.alternative.worse));
-        Ok(rivals)
+        let alternatives = self.parallel(best.len(), converged);
+        let mut alternatives: Vec<_> = alternatives.into_iter().flatten().collect();
+        alternatives.sort_by(|a, b| a.alternative.worse.total_cmp(&b.alternative.worse));
+        Ok(alternatives)
     }
 
     /// What refined shapes must earn before a simpler explanation is given up for them (Schwarz' criterion).
@@ -529,13 +531,13 @@ mod tests {
     #[test]
     fn an_effect_must_explain_more_than_the_law_of_another_misses() {
         let friction = Effect::<f64>::new(Kind::Coulomb, 1);
-        let missed = friction.kind.prior().squared_law_error;
-        assert_eq!(missed, 0.03);
+        let law_error = friction.kind.prior().squared_law_error;
+        assert_eq!(law_error, 0.03);
         let in_joint = |kind, joint| mimicked(&Effect::<f64>::new(kind, joint), &friction, 1000.0);
-        assert_eq!(in_joint(Kind::Viscous, 1), 1000.0 * missed);
+        assert_eq!(in_joint(Kind::Viscous, 1), 1000.0 * law_error);
         assert_eq!(in_joint(Kind::Viscous, 0), 7.5);
         // A spring over joints 1 and 2 acts in both, a bias of the sensor in none.
-        assert_eq!(in_joint(Kind::Biarticular, 1), 1000.0 * missed);
+        assert_eq!(in_joint(Kind::Biarticular, 1), 1000.0 * law_error);
         assert_eq!(in_joint(Kind::ForceBias, 0), 7.5);
         // A ripple of the robot is alike in every movement, which what a law misses is not.
         assert_eq!(in_joint(Kind::RobotRipple, 0), 1.5);

@@ -1,4 +1,4 @@
-//! The passive base of an arm in the simulation: which of the laws suggested by measured motion it needs, and which of them are named.
+//! Selection of the laws of the passive base: those that the simulation needs, and those that are named.
 //!
 //! The closed chain is simulated with the base that was identified from measured motion. Its parameters stay free with every candidate,
 //! and its laws are selected last.
@@ -397,27 +397,27 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             return;
         };
         let place = (slot, &less, entry);
-        let rivals = self.rivals(fitted, place, (point, library), scale);
-        let mut rivals = rivals.unwrap_or_default();
-        let all = rivals.iter().map(|r| &r.fitted);
+        let alternatives = self.alternatives(fitted, place, (point, library), scale);
+        let mut alternatives = alternatives.unwrap_or_default();
+        let all = alternatives.iter().map(|r| &r.fitted);
         law.nearer = all
-            .filter(|rival| rival.cost + TIE * scale < fitted.cost)
+            .filter(|other| other.cost + TIE * scale < fitted.cost)
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
             .cloned();
-        for rival in &mut rivals {
-            let alternative = &mut rival.alternative;
+        for converged in &mut alternatives {
+            let alternative = &mut converged.alternative;
             if !alternative.candidate.kind().prior().passive {
                 alternative.worse += ODDS;
             }
         }
         let own = (&law.question, law.gain);
-        law.better = rivals
+        law.better = alternatives
             .iter()
             // A law that few joints have is tested beside the base, and does not replace it.
             .filter(|r| r.alternative.candidate.kind().prior().passive)
             .find(|r| self.takes_over(&r.alternative, own, 0.0))
             .map(|r| r.fitted.clone());
-        law.alternatives = self.ties(rivals, &law.question, law.gain);
+        law.alternatives = self.ties(alternatives, &law.question, law.gain);
     }
 
     /// Names a law of the base: it stands among the named effects from here on.

@@ -1,4 +1,4 @@
-//! How clearly a law of the passive base must stand out: to stay in the simulation, and to be named.
+//! Evidence that a law of the passive base needs to stay in the simulation, and to be named.
 
 use arm_core::effect::Effect;
 use arm_ident::regression::unknown::spring;

@@ -1,4 +1,4 @@
-//! What each candidate would explain, to first order: with everything refitted that was never exact.
+//! Score tests: the gain of each candidate to first order, with all nuisance parameters refitted.
 
 use arm_numerics::linalg::matrix::add_scaled;
 use arm_numerics::{Cholesky, Matrix};

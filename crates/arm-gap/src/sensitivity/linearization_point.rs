@@ -1,5 +1,4 @@
-//! A simulated hypothesis and its neighbourhood to first order: readings under other hypotheses, the response of the channels
-//! to small changes, and the rows of the nuisances.
+//! A simulated hypothesis, linearised: readings under other hypotheses, responses to small changes, rows of the nuisances.
 //!
 //! One trial of each movement is simulated. Repeats follow it along their own handle's path, other hypotheses follow it
 //! as changes; both cost a hundredth of a simulation.

@@ -1,4 +1,4 @@
-//! Normal equations, trial by trial, from which every candidate is tested.
+//! Normal equations of each trial, from which every candidate is tested.
 
 use std::sync::Arc;
 

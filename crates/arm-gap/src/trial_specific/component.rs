@@ -1,5 +1,4 @@
-//! What is not the same in every trial, or swings too fast for the common band: a rhythm, the robot's ripple, or a disturbance
-//! of one trial.
+//! A trial-specific effect: a rhythm, the robot's ripple, or a disturbance of one trial.
 
 use arm_core::effect::{Effect, Kind, MAX_PARAMETERS};
 
@@ -21,7 +20,7 @@ pub struct TrialSpecific {
     /// What it gains, in units of twice the log-likelihood.
     pub gain: f64,
     /// Others that explain as much.
-    pub rivals: Vec<(Effect<f64>, f64)>,
+    pub alternatives: Vec<(Effect<f64>, f64)>,
     /// Whether its phase is the same in every trial.
     pub locked: bool,
     /// The swings that a rhythm is made of, and their sizes in every trial: in phase, and a quarter of a period earlier.
@@ -75,8 +74,8 @@ impl TrialSpecific {
     /// What would make the same difference between two repeats in the other one: the opposite of it.
     pub fn in_the_other_repeat(mut self, trial: usize) -> Self {
         self.trial = Some(trial);
-        let rivals = self.rivals.iter_mut().map(|(effect, _)| effect);
-        for effect in std::iter::once(&mut self.effect).chain(rivals) {
+        let alternatives = self.alternatives.iter_mut().map(|(effect, _)| effect);
+        for effect in std::iter::once(&mut self.effect).chain(alternatives) {
             let sizes = effect.kind.prior().parts.iter().flat_map(|part| part.sizes);
             for &size in sizes {
                 effect.parameters[size] = -effect.parameters[size];
@@ -129,7 +128,7 @@ mod tests {
             sd: Vec::new(),
             trial,
             gain: 0.0,
-            rivals: Vec::new(),
+            alternatives: Vec::new(),
             locked: false,
             columns: Vec::new(),
             sizes: Vec::new(),

@@ -1,4 +1,4 @@
-//! The contact, refitted to the free vibrations of the arm on it.
+//! Identification of the contact from the free vibrations of the arm on it.
 //!
 //! Effects are named in the band of the movements, where the damping of the contact hardly shows and takes on whatever laws
 //! miss. Above that band a jolted arm vibrates on its contact, which determines stiffness and damping.

@@ -52,7 +52,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 sd: first.sd(scale, shrink),
                 trial: Some(self.fitted[suspect.place]),
                 gain: first.gain / scale,
-                rivals: explained[1..]
+                alternatives: explained[1..]
                     .iter()
                     .map(|other| (other.effect(shrink), worth - self.worth(other, scale)))
                     .filter(|(_, worse)| *worse <= TIE)
@@ -388,7 +388,7 @@ mod tests {
             sd: vec![0.01],
             trial: Some(0),
             gain: 50.0,
-            rivals: Vec::new(),
+            alternatives: Vec::new(),
             locked: false,
             columns: Vec::new(),
             sizes: Vec::new(),

@@ -1,4 +1,4 @@
-//! The shapes of disturbances: what the channels would show of each, and when it explains most.
+//! Shapes of disturbances: the response of the channels to each, and the time at which it explains most.
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature, Place};
 

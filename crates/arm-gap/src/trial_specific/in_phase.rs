@@ -1,4 +1,6 @@
-//! Slow oscillations with one phase in all trials: of the robot, the shoulder, a muscle. Movements have power at the same frequencies, so
+//! Slow oscillations with one phase in all trials, of the robot, the shoulder or a muscle.
+//!
+//! Movements have power at the same frequencies, so
 //! they are no lines in a spectrum; they are tested as other effects are, frequency by frequency.
 
 use core::f64::consts::FRAC_PI_2;

@@ -1,6 +1,6 @@
 //! A hypothesis in one trial: the place of the handle in the hand and in space, and the phase of each rhythm.
 //!
-//! Neither is the same from one trial to the next, so they are estimated from each trial alone,
+//! Both differ from one trial to the next, so they are estimated from each trial alone,
 //! whatever its role and hypothesis: two numbers each for the handle, as far as what is declared of it lets them
 //! go, and one for a rhythm.
 

@@ -1,4 +1,4 @@
-//! A rhythm that was found is set apart: taken out of the measured channels, or put into the runs that are compared with them.
+//! Removal of a rhythm: subtracted from the measured channels, or added to the runs that are compared with them.
 
 use std::sync::Arc;
 

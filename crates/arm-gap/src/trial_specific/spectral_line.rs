@@ -1,4 +1,4 @@
-//! A line in the spectra of residuals: the noise beside it, its share, and what swings explain of it.
+//! A line in the spectra of residuals: its share, the noise beside it, and the part that oscillations explain.
 
 use arm_numerics::Matrix;
 

@@ -1,4 +1,4 @@
-//! Rhythms of muscles and the robot's ripple: what swings, too fast for the common band or with another phase in every trial.
+//! Detection of tremor and of the robot's ripple: oscillations above the common band, or with another phase in every trial.
 
 use arm_core::effect::{Effect, KINDS, Kind, Nature};
 use arm_core::{Contact, Joints, Pose, jacobian};
@@ -144,7 +144,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut list = best.into_iter();
         let (most, first) = list.next().filter(|(_, e)| e.is_plain(frequency))?;
-        let rivals = list
+        let alternatives = list
             .filter(|(worth, other)| {
                 let same = (other.effect.kind, other.effect.index)
                     == (first.effect.kind, first.effect.index);
@@ -157,7 +157,7 @@ impl<const N: usize> PreparedSession<'_, N> {
             sd: vec![first.sd],
             trial: None,
             gain: first.gain,
-            rivals,
+            alternatives,
             locked: first.locked,
             columns: first.columns,
             sizes: first.sizes,

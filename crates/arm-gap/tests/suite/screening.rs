@@ -51,11 +51,12 @@ fn movements_tell_a_spring_from_friction_and_not_from_itself() {
     let session = session(&[spring()], (1e-3, 0.1));
     let prepared = PreparedSession::new(&session, 2).expect("a sound session");
     let coulomb = Kind::named("coulomb").expect("known");
-    let rivals = [
+    let alternatives = [
         (spring(), vec![0]),
         (Effect::new(coulomb, 1).with(&[0.2, 0.01]), vec![0]),
     ];
-    let discrimination = Discrimination::new(prepared, spring(), &rivals).expect("a comparison");
+    let discrimination =
+        Discrimination::new(prepared, spring(), &alternatives).expect("a comparison");
     let now = discrimination.distances(None).expect("distances");
     assert!(now[0] < 0.1, "{now:?}");
     assert!(now[1] > 5.0, "{now:?}");

@@ -1,4 +1,4 @@
-//! The cascade on raw samples, in one streamed pass: angles and forces in, estimates out, nothing kept in between.
+//! The cascade on raw samples, in one streamed pass without stored rows.
 //!
 //! One pass folds `[1, y_N … y_1 | t_N … t_1]` into a triangle of `2N + 1` columns, `y_k` being the gravity column of link k and
 //! `t_j` the torque `(JᵀF)_j`. The step of joint j needs the columns `1, y_N … y_j`, which lead: its own triangle is a corner of the

@@ -1,4 +1,4 @@
-//! From the solved steps to numbers with names, intervals and what decided them.
+//! Estimates of the solved steps, with names, intervals and what decided them.
 
 use super::covariance::{covariance, moved_by, stretches};
 use super::step::Step;

@@ -1,4 +1,4 @@
-//! Before an experiment: a movement that shows the parameters well.
+//! Search for movements that determine the parameters well.
 //!
 //! The search is a (1+1) evolution strategy over waypoints with restarts (Rechenberg's rule
 //! for its step), as trapezoids at two speeds come within a few percent of optimised Fourier series.

@@ -1,4 +1,4 @@
-//! Before an experiment: how well a movement will show each parameter.
+//! Forecast of the precision with which a movement determines each parameter.
 //!
 //! A movement is simulated in the closed chain, its rows are those of [`joint`](crate::inference::joint_method), and noise of force and angle sensors is carried
 //! through them to a covariance `H⁻¹ M H⁻¹`.

@@ -1,4 +1,4 @@
-//! Before an experiment: what a movement will show, and one that shows it well.
+//! Experiment design: forecasts of movements, and search for better ones.
 
 pub mod design;
 pub mod forecast;

@@ -1,4 +1,4 @@
-//! Parameters of effects fitted by simulation: of all runs the one that comes closest to recorded angles and forces.
+//! Fit of effects by simulation: the parameters whose run is nearest to recorded angles and forces.
 //!
 //! Levenberg and Marquardt's method within bounds. Each round simulates the estimate and one run beside it for every parameter in
 //! one batch, so the derivatives come almost for nothing: they go in the lanes beside the run.

@@ -1,4 +1,4 @@
-//! What a physical arm must satisfy, as bounds, inequalities and second-order cones over the unknowns.
+//! Physical constraints of an arm, as bounds, inequalities and second-order cones over the unknowns.
 
 use crate::error::IdentError;
 use crate::regression::trial::Model;

@@ -1,4 +1,4 @@
-//! What an identification returns.
+//! The result of an identification.
 
 use arm_core::effect::Effect;
 pub use arm_core::estimator::Decision;

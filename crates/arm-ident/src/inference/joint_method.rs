@@ -1,4 +1,4 @@
-//! The joint method: all joints at once, all linear effects, physical consistency, honest intervals.
+//! The joint method: all joints and all linear effects at once, under physical constraints, with intervals.
 
 use arm_sim::Springs;
 

@@ -1,4 +1,4 @@
-//! What sizes in a joint are compared with: the weight moment that it carries, and the middle of its angles.
+//! Scales of quantities in a joint: the weight moment that it carries, and the middle of its angles.
 
 use arm_core::Chain;
 use arm_numerics::statistics::extent::extent;

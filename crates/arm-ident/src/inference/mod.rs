@@ -1,4 +1,4 @@
-//! From rows to estimates: the joint method, rank, intervals, restarts; fits by simulation.
+//! Inference from rows: the joint method, rank, intervals, multistart; fits by simulation.
 
 pub mod by_simulation;
 pub mod constraint;

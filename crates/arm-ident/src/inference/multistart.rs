@@ -1,4 +1,4 @@
-//! A fit that may have ended in the wrong minimum starts again from elsewhere, and the better end counts.
+//! Multistart: repeats a fit that may be in a wrong minimum, and keeps the better one.
 //!
 //! What follows slopes ends in the hollow in which it starts. A parameter at a bound or rounds that come to no rest are its marks; they are no proof,
 //! for friction may well be zero. So nothing is lost by another start but time, and what ends between all bounds is left as it is.

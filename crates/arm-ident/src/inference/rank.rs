@@ -1,4 +1,4 @@
-//! Which parameters a movement distinguishes: numerical rank, null space, base parameters and their grouping.
+//! Numerical rank: null space, base parameters and their grouping.
 //!
 //! Columns are scaled first (by prior standard deviations: then a singular value above 1 means that the data beat the prior; or by the column norms:
 //! then the rank is a property of the movement alone). The rank is counted in the singular values; a column-pivoted QR factor picks base columns and gives

@@ -1,4 +1,4 @@
-//! Whether dry friction sticks: the smooth law and the set-valued one are compared by the motion and the force of simulated runs.
+//! Decides whether dry friction sticks: compares the smooth and the set-valued law by simulated runs.
 //!
 //! Torques cannot decide. Where a joint sticks nothing follows from its row, so the set-valued law would be judged by fewer of them.
 

@@ -1,4 +1,4 @@
-//! From a solved problem to named estimates with intervals and the source of each.
+//! Named estimates of a solved problem, with intervals and the source of each.
 
 use crate::error::IdentError;
 use crate::inference::constraint::base_parameters;

@@ -1,4 +1,4 @@
-//! A model with estimates in place of its own values, and back.
+//! Conversion between a model and its estimates.
 
 use arm_core::Chain;
 use arm_core::effect::Effect;

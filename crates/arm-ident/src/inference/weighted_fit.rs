@@ -1,4 +1,4 @@
-//! Weighted constrained least squares of prepared rows: estimate and weights in turn.
+//! Weighted constrained least squares of prepared rows, alternating between estimate and weights.
 
 use crate::error::IdentError;
 use crate::inference::constraint::{binding_gradients, common_scale, program};

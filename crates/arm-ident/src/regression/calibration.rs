@@ -1,4 +1,4 @@
-//! How small imperfections of the measurement show in the rows of the regression.
+//! Columns of small imperfections of the measurement in the rows of the regression.
 //!
 //! Each imperfection is a column: its first-order influence on the left-hand side. The columns are computed from the
 //! force that the *model* predicts, never from the measured one: a column that carries the noise of the right-hand side

@@ -1,4 +1,4 @@
-//! States of effects that have one, along a measured or simulated motion.
+//! Internal states of effects along a measured or simulated motion.
 
 use crate::regression::trial::Model;
 use arm_core::effect::{Effect, MAX_STATES, Motion, States, advance_states};

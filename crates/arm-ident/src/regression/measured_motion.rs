@@ -1,4 +1,4 @@
-//! Joint motion for the regressors, from what was measured.
+//! Joint motion for the regressors, from measured angles.
 //!
 //! Speeds are those measured where there are some. Elsewhere angles are low-passed with a zero-phase Butterworth filter of
 //! order [`ORDER`] and differentiated by central differences. Speeds gained so are fit for motor encoders; with camera noise

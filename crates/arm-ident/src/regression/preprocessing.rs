@@ -1,4 +1,4 @@
-//! From raw rows to those that are fitted: the common low-pass, decimation, and weights.
+//! Preprocessing of rows: the common low-pass, decimation, and weights.
 
 use core::array::from_fn;
 use std::collections::BTreeMap;

@@ -1,4 +1,4 @@
-//! What an unknown changes in the torques by moving the arm otherwise.
+//! Sensitivity of the torques to an unknown that changes the motion of the arm.
 //!
 //! A robot that leads the hand does not hold every joint: where the arm has more joints than the handle has directions, what it
 //! does between shoulder and handle depends on its own springs, friction and inertia. Torques computed along a simulated motion

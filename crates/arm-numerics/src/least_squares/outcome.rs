@@ -1,4 +1,4 @@
-//! What a constrained solve returns.
+//! The outcome of a constrained solve.
 
 /// How a solve ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

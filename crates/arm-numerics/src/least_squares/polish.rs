@@ -1,4 +1,4 @@
-//! From an interior point that is nearly optimal to the optimum: the binding constraints become equalities.
+//! Polish of a nearly optimal interior point: the binding constraints become equalities.
 //!
 //! Linear constraints give an equality-constrained least-squares problem. A binding cone is followed by Newton's method on the optimality conditions:
 //! the curvature of `λ(‖Ax+b‖ − cᵀx − d)` is a sum of squares, so each step is again such a least-squares problem and `R` is never squared.

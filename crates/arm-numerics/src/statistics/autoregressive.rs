@@ -1,4 +1,4 @@
-//! Residuals that are not white: effective number of samples, autoregressive models and whitening.
+//! Autoregressive residuals: effective number of samples, models and whitening.
 //!
 //! A series is one uninterrupted trial. Several trials are given side by side and never joined: no lag crosses their ends.
 

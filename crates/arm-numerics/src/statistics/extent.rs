@@ -1,4 +1,4 @@
-//! How far some values reach.
+//! The extent of a series of values.
 
 /// The least and the greatest of some values; infinite, the wrong way round, of none.
 pub fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {

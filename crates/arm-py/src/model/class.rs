@@ -1,4 +1,4 @@
-//! What the classes have in common: they wrap a type of `arm-model`, are values, and read and write the tables of the files.
+//! Common parts of the model classes: each wraps a type of `arm-model`, is a value, and reads and writes the tables of the files.
 
 use arm_model::{Refused, Table, Value};
 use pyo3::prelude::*;

@@ -1,4 +1,4 @@
-//! The classes of `arm-model` in Python: the very objects, frozen, with the attributes that the files have as keys.
+//! The types of `arm-model` as frozen Python classes, with the keys of the files as attributes.
 
 mod class;
 mod dataset;

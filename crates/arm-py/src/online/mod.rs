@@ -1,5 +1,4 @@
-//! What a device runs, in Python: the estimator, the compensation and the monitor of the C interface, with its sizes and its order of
-//! operations.
+//! The functions of a device in Python: estimator, compensation and monitor of the C interface, with its sizes and order of operations.
 
 mod compensation;
 mod estimator;

@@ -1,4 +1,4 @@
-//! How an estimator works.
+//! Settings of an estimator.
 
 use arm_core::Real;
 use arm_core::estimator::Settings;

@@ -1,4 +1,4 @@
-//! What the classes of results have in common: each wraps a type of the core, is a value, and is JSON by the serde of that type.
+//! Common parts of the result classes: each wraps a type of the core, is a value, and is JSON by the serde of that type.
 
 use arm_core::estimator::Decision;
 use indexmap::IndexMap;

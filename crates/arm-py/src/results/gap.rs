@@ -1,4 +1,4 @@
-//! What the gap workflow returns, part by part.
+//! The parts of a result of the gap workflow.
 
 use arm_gap::results as core;
 use pyo3::prelude::*;

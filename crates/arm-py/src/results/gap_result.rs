@@ -1,4 +1,4 @@
-//! What the gap workflow returns, as a whole.
+//! The result of the gap workflow.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What an identification returns.
+//! The result of an identification.
 
 use std::sync::Arc;
 

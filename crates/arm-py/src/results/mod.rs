@@ -1,4 +1,4 @@
-//! Results in Python: the very types of the core, frozen, with attributes, `repr`, equality, pickling and JSON.
+//! Results in Python: the types of the core, frozen, with attributes, `repr`, equality, pickling and JSON.
 
 mod class;
 mod gap;

@@ -1,4 +1,4 @@
-//! What a plan, and a fit by simulation, return.
+//! The results of a plan, and of a fit by simulation.
 
 use arm_ident::experiment_design::results as core;
 use arm_ident::inference::by_simulation;

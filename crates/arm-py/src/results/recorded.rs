@@ -1,4 +1,4 @@
-//! `Recording` and `Readings`: the samples of a run, and what sensors read of it.
+//! `Recording` and `Readings`: the samples of a run, and the sensor readings of it.
 
 use arm_sim::{Piece, Readings as Read, SimulationError};
 use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};

@@ -1,4 +1,4 @@
-//! How long a step may be: before the vibration of the contact grows, and to follow steep dry friction.
+//! Limits of the step: stability of the contact's vibration, and steep dry friction.
 
 use arm_core::effect::Effect;
 use arm_core::{Chain, Contact, Joints, Pose, inertia};

@@ -1,4 +1,4 @@
-//! What drives the arm at one instant, its state, and what follows from both.
+//! The drive of the arm at one instant, its state, and the quantities that follow from both.
 
 use arm_core::effect::Motion;
 use arm_core::{Joints, Lanes, Plane, Scalar, Setup};

@@ -1,4 +1,4 @@
-//! Runs with angles of a stated accuracy: the step is found by comparing runs.
+//! Runs with angles of a stated accuracy: comparison of runs determines the step.
 //!
 //! On a uniform grid the error of the fourth-order method is `C hᵖ` at every sample, so that two runs with steps h and r h differ
 //! by `(rᵖ − 1)` times the error of the finer one (Richardson 1911). The order p is 4 where all is smooth. Where something is not (dry

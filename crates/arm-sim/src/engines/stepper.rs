@@ -1,4 +1,4 @@
-//! The native engine a piece at a time: what couples an arm to other simulators drives it through this.
+//! The native engine step by step, for coupling with other simulators.
 
 use arm_core::effect::{Effect, MAX_STATES, States};
 use arm_core::{Joints, Plane, Pose, Setup};

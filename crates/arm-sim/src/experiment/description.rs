@@ -1,4 +1,4 @@
-//! What is simulated: the rig, what acts in it, how it is driven, and the numerical settings.
+//! The description of an experiment: the rig, its effects, its drive, and the numerical settings.
 
 use arm_core::effect::Effect;
 use arm_core::{Chain, Joints, Pose, Robot, Setup, inertia};

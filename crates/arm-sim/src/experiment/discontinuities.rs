@@ -1,4 +1,4 @@
-//! Where steps are cut: at the times at which the drive is not smooth.
+//! Times at which the drive is not smooth, where steps are divided.
 //!
 //! A method has its order where what it integrates is smooth within each step. Simpson's rule, which is what Rk4 makes of the
 //! handle's work `∫ F·v dt`, is wrong by up to `h²/24 · F·Δa` where the acceleration jumps by Δa inside a step, by an amount

@@ -1,4 +1,4 @@
-//! Where the robot's handle is at any time.
+//! The path of the robot's handle over time.
 
 use core::array::from_fn;
 

@@ -1,4 +1,4 @@
-//! What is simulated: the rig, its drive, the desired motion of joints and handle, and the times of steps and samples.
+//! Experiments: the rig, its drive, the desired motion of joints and handle, and the times of steps and samples.
 
 pub(crate) mod description;
 pub(crate) mod discontinuities;

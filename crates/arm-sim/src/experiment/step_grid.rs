@@ -1,4 +1,4 @@
-//! When steps are made and samples taken.
+//! Times of the steps and of the samples.
 
 use crate::{Experiment, SimulationError};
 

@@ -1,4 +1,4 @@
-//! One step of the grid, in pieces where the drive is not smooth.
+//! One step of the grid, divided where the drive is not smooth.
 
 use crate::closed_chain::state::{Input, State};
 use crate::experiment::discontinuities::ON_GRID;

@@ -1,4 +1,4 @@
-//! What drives a run, computed ahead for some steps at a time: side by side it costs a fraction.
+//! Buffer of the inputs of a run, computed for several steps at a time in SIMD lanes.
 
 use arm_core::Scalar;
 

@@ -1,4 +1,4 @@
-//! What sensors read of a run.
+//! Sensor readings of a run.
 
 use arm_core::{Joints, Reading};
 

@@ -1,4 +1,4 @@
-//! Where an arm comes to rest from given angles if its joints are strongly damped, all alike: a stable equilibrium.
+//! Stable equilibrium that an arm reaches from given angles if all its joints are strongly and equally damped.
 //!
 //! The damped motion `σ q̇ = −r(q)`, with r the torques that are left, is followed by linearly implicit Euler steps,
 //! `(∂r/∂q + σ) Δq = −r`: pseudo-transient continuation (Kelley, Keyes 1998). σ is the smallest of a series with which the matrix

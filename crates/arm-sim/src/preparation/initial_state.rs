@@ -1,4 +1,4 @@
-//! The state in which a run starts.
+//! The initial state of a run.
 
 use arm_core::effect::{MAX_STATES, dry_friction};
 use arm_core::{Contact, Joints, Pose};

@@ -1,4 +1,4 @@
-//! From an experiment to a run that can start: checks, effects applied, and the initial state.
+//! Preparation of an experiment: checks, effects applied, and the initial state.
 
 mod equilibrium;
 pub(crate) mod initial_state;

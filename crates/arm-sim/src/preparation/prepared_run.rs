@@ -1,4 +1,4 @@
-//! From an experiment to what a run needs: checks, effects applied, schedule, robot angles.
+//! A prepared run: checked experiment, effects applied, schedule, robot angles.
 
 use std::array::from_fn;
 use std::ops::Range;

@@ -1,4 +1,4 @@
-//! What is recorded of a run, and its digest.
+//! Recorded quantities of a run, and their digest.
 
 pub(crate) mod digest;
 pub(crate) mod record;

@@ -1,4 +1,4 @@
-//! What is recorded of a run.
+//! The recorded quantities of a run.
 
 use crate::SimulationError;
 use arm_core::effect::Kind;

@@ -1,4 +1,4 @@
-//! Fills a recording from states, for every engine in the same way.
+//! The recorder, which fills a recording from states for every engine.
 
 use core::ops::ControlFlow;
 

@@ -1,4 +1,4 @@
-//! What acts on the bodies in a step, and what is known of the arm once it is made.
+//! Forces on the bodies in one step, and the constants of the arm.
 //!
 //! Positions are known at whole steps and speeds at half steps. A speed at a whole step is extrapolated from the two half
 //! steps before it where a force needs it, and the mean of the half steps around it where it is recorded; both are of

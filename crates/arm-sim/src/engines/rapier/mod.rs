@@ -1,4 +1,4 @@
-//! The second engine: the same experiment from rigid bodies and joints, solved by [rapier](https://rapier.rs).
+//! The second engine: the same experiment with rigid bodies and joints, solved by [rapier](https://rapier.rs).
 //!
 //! It shares with the native engine the laws of the effects and the contact, how a motion begins, and the recording. The
 //! dynamics are its own: three coordinates a segment, joints as constraints, forces by an iterative solver. No inertia

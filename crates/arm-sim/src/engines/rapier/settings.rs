@@ -1,4 +1,4 @@
-//! What can be set of the solver.
+//! Settings of the solver.
 
 /// How rapier solves for the forces in the joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

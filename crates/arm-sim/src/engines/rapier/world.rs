@@ -1,4 +1,4 @@
-//! The arm as rapier holds it: one rigid body a segment, a revolute joint between each two, and nothing that collides.
+//! The arm in rapier: one rigid body for each segment, revolute joints between them, and no collisions.
 
 use core::array::from_fn;
 use core::f64::consts::TAU;

@@ -1,4 +1,4 @@
-//! What friction that grows with the joint force adds to itself.
+//! Feedback gain of friction that grows with the joint force.
 
 use arm_core::Joints;
 

@@ -1,4 +1,4 @@
-//! Dry friction at one instant: which joints stick, and what their friction is.
+//! Dry friction at one instant: the joints that stick, and the friction torques.
 
 use arm_core::effect::{Motion, States, dry_friction, dry_friction_of};
 use arm_core::{Joints, Plane, Pose, Resistance, Scalar};

@@ -1,4 +1,4 @@
-//! Where a margin first goes below zero.
+//! Location of the time at which a margin becomes negative.
 
 /// Trials by regula falsi; then by halves, which locate everything in 40 more.
 const BY_VALUES: usize = 20;

@@ -1,4 +1,4 @@
-//! Steps with dry friction, which is solved for: a joint slips one way or sticks, and switches between these are located.
+//! Steps with set-valued dry friction: each joint slips one way or sticks, and switches are located.
 //!
 //! The torque of dry friction is set-valued: c against the motion, and at rest any torque from −c to c that holds the joint.
 //! Smoothed, it is so stiff that an explicit method needs steps far below those of everything else. So joints whose speed in
