@@ -108,7 +108,7 @@ pub enum SimulationError {
         "at {time} s the friction torque of joint {} has no unique solution: it increases the joint force on which it depends, with a loop gain of {gain:.3}, allowed is less than 0.98; the friction coefficient is too large for this arm",
         joint + 1
     )]
-    Jam {
+    AmbiguousFriction {
         /// Time \[s\].
         time: f64,
         /// Zero-based joint.

@@ -32,7 +32,7 @@ pub struct Candidate {
     /// Change of the free parameters with which responses are taken.
     pub step: f64,
     /// Gain needed to be named, in units of twice the log-likelihood, where scores scatter as the noise model predicts; zero
-    /// before a scan has set it.
+    /// before a score test has set it.
     pub price: f64,
     /// Scatter of its score between repeats, relative to that of the noise model.
     pub spread: f64,
@@ -262,7 +262,7 @@ impl Candidate {
 
 #[cfg(test)]
 impl Candidate {
-    /// A candidate for the first parameter of an effect, before a scan.
+    /// A candidate for the first parameter of an effect, before a score test.
     pub(crate) fn about(effect: Effect<f64>) -> Self {
         Self {
             effect,

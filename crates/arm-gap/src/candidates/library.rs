@@ -27,7 +27,7 @@ pub struct Library {
 }
 
 impl Library {
-    /// The candidates of the whole catalogue, linearised at an anchor.
+    /// The candidates of the whole catalogue, linearised at a linearization point.
     ///
     /// * `periodic` - frequency \[Hz\] and phase \[rad\] of an oscillation with one phase in all trials, if there is one
     ///
@@ -118,7 +118,7 @@ impl Library {
         })
     }
 
-    /// The responses in the rows of the anchor, whitened once for all uses there.
+    /// The responses in the rows of the linearization point, whitened once for all uses there.
     pub(crate) fn columns<const N: usize>(
         &self,
         prepared: &PreparedSession<N>,

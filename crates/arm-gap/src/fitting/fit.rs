@@ -88,7 +88,7 @@ fn named<const N: usize>(hypothesis: &Hypothesis<N>, asked: &[Candidate]) -> Vec
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// A hypothesis near an anchor with its residuals and their cost.
+    /// A hypothesis near a linearization point with its residuals and their cost.
     pub(crate) fn state(
         &self,
         point: &LinearizationPoint<N>,
@@ -140,12 +140,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (coordinates, clusters)
     }
 
-    /// Fits the nuisances and the named effects of a hypothesis, followed from an anchor.
+    /// Fits the nuisances and the named effects of a hypothesis, followed from a linearization point.
     ///
     /// * `asked` - the candidate behind each named effect
     ///
     /// # Errors
-    /// [`GapError`] where the start cannot be followed from the anchor.
+    /// [`GapError`] where the start cannot be followed from the linearization point.
     pub fn fit(
         &self,
         point: &LinearizationPoint<N>,

@@ -21,7 +21,7 @@ const LEAST_LEFT_OF_MEASURED: f64 = 0.15;
 impl<const N: usize> PreparedSession<'_, N> {
     /// Leaves out what dry friction makes unknowable where its joint rests or reverses: there friction is whatever holds it.
     ///
-    /// Whether anything changed since the last time; then anchors are to be made anew. The samples of repeats stay the same:
+    /// Whether anything changed since the last time; then linearization points are to be made anew. The samples of repeats stay the same:
     /// they rest together.
     pub fn leave_out_rest(&mut self, point: &LinearizationPoint<N>) -> bool {
         let dry = dry_joints(&point.hypothesis);

@@ -308,9 +308,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.calibrate()
     }
 
-    /// One round: the best choices of the scan, converged by simulation; `None` when none is worth its price and possible.
+    /// One round: the best choices of the score tests, converged by simulation; `None` when none is worth its price and possible.
     ///
-    /// Where the shape of a law converges to that of a simpler one, the scan is repeated without it.
+    /// Where the shape of a law converges to that of a simpler one, the score tests are repeated without it.
     fn round(
         &self,
         state: &SearchState<'a, N>,

@@ -133,7 +133,7 @@ impl<'a, const N: usize> Discrimination<'a, N> {
     }
 }
 
-/// A hypothesis on a study, without the samples at which dry friction of it holds a joint.
+/// A hypothesis on a session, without the samples at which dry friction of it holds a joint.
 fn rested<'a, const N: usize>(
     prepared: &mut PreparedSession<'a, N>,
     hypothesis: &Hypothesis<N>,

@@ -248,10 +248,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// Chooses the samples and reads the noise anew from where the next calibration starts.
     fn read_anew(&mut self) -> Result<(), GapError> {
-        let anchor = self.linearize(&self.given())?;
-        self.leave_out_rest(&anchor);
-        let anchor = self.linearize(&self.given())?;
-        self.measure_noise(&anchor)
+        let point = self.linearize(&self.given())?;
+        self.leave_out_rest(&point);
+        let point = self.linearize(&self.given())?;
+        self.measure_noise(&point)
     }
 
     /// Selects the laws of the base once everything is named: laws below their price are dropped one after the other and the rest is
@@ -481,16 +481,16 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             ..self.session.clone()
         };
         let refitted = PreparedSession::with_noise(&session, self.noise.of_others(), self.threads)
-            .and_then(|study| study.settle(session.given(), Vec::new()))
+            .and_then(|prepared| prepared.settle(session.given(), Vec::new()))
             .map(|(fitted, _)| fitted.hypothesis);
         let mut hypothesis = refitted.unwrap_or_else(|_| session.given());
         hypothesis.known = self.session.given().known;
         for passive in &mut hypothesis.known[session.effects.len()..] {
             passive.parameters[0] = 0.0;
         }
-        let simulated = self.linearize(&hypothesis).and_then(|anchor| {
-            let fitted = self.state(&anchor, hypothesis.clone(), Vec::new())?;
-            let lack = lack_of_fit(self, &anchor, &fitted);
+        let simulated = self.linearize(&hypothesis).and_then(|point| {
+            let fitted = self.state(&point, hypothesis.clone(), Vec::new())?;
+            let lack = lack_of_fit(self, &point, &fitted);
             Ok((fitted, lack))
         });
         Some(simulated.unwrap_or_else(|_| {

@@ -68,7 +68,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         hypothesis: &Hypothesis<N>,
     ) -> Result<LinearizationPoint<'a, N>, GapError> {
-        self.anchored(hypothesis, self.nuisances())
+        self.linearized_for(hypothesis, self.nuisances())
     }
 
     /// The same without rows of the nuisances, which the cost of the hypothesis itself does not need.
@@ -79,14 +79,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         hypothesis: &Hypothesis<N>,
     ) -> Result<LinearizationPoint<'a, N>, GapError> {
-        let alone = self.anchored(hypothesis, Vec::new())?;
+        let alone = self.linearized_for(hypothesis, Vec::new())?;
         Ok(LinearizationPoint {
             coordinates: self.nuisances(),
             ..alone
         })
     }
 
-    fn anchored(
+    fn linearized_for(
         &self,
         hypothesis: &Hypothesis<N>,
         coordinates: Vec<Coordinate>,
@@ -119,7 +119,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(point)
     }
 
-    /// What the sensors would read on trials under the anchor's hypothesis, in the common band.
+    /// What the sensors would read on trials under the linearization point's hypothesis, in the common band.
     fn shown_on(
         &self,
         point: &LinearizationPoint<N>,
@@ -219,7 +219,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         all.into_iter().collect()
     }
 
-    /// Measured less predicted channels of the fitted trials under a hypothesis near the anchor.
+    /// Measured less predicted channels of the fitted trials under a hypothesis near the linearization point.
     ///
     /// # Errors
     /// [`GapError::Simulation`] names the first trial on which it cannot be followed.
@@ -240,7 +240,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(residuals.collect())
     }
 
-    /// How changes of the anchor's hypothesis change what the channels of each group's reference read, for one unit.
+    /// How changes of the linearization point's hypothesis change what the channels of each group's reference read, for one unit.
     ///
     /// # Errors
     /// [`GapError::Simulation`] where a change is not possible.
@@ -261,9 +261,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.each_response_from(point, (&[], &point.shown), changes)
     }
 
-    /// The same for changes of another hypothesis, along the runs of the anchor.
+    /// The same for changes of another hypothesis, along the runs of the linearization point.
     ///
-    /// * `origins`, `base` - that hypothesis beside each run, or nothing for the anchor's own; and where torques are compared, what it shows
+    /// * `origins`, `base` - that hypothesis beside each run, or nothing for that of the point; and where torques are compared, what it shows
     fn each_response_from(
         &self,
         point: &LinearizationPoint<N>,
@@ -294,7 +294,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             .collect()
     }
 
-    /// Responses to numbers of the anchor's hypothesis.
+    /// Responses to numbers of the linearization point's hypothesis.
     ///
     /// # Errors
     /// As [`PreparedSession::responses`].
@@ -321,7 +321,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(coordinates.iter().filter_map(of).collect())
     }
 
-    /// Responses to numbers of a hypothesis away from the anchor.
+    /// Responses to numbers of a hypothesis away from the linearization point.
     ///
     /// # Errors
     /// As [`PreparedSession::residuals`].
@@ -367,7 +367,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// Measured less predicted channels of the fitted trials under the anchor's hypothesis, before the low-pass.
+    /// Measured less predicted channels of the fitted trials under the linearization point's hypothesis, before the low-pass.
     ///
     /// # Errors
     /// As [`PreparedSession::residuals`].

@@ -213,8 +213,8 @@ pub(crate) fn why(
     memory: &Memory<f64>,
     (step, time, joint): (usize, f64, usize),
 ) -> SimulationError {
-    match memory.jam {
-        Some(jam) => jam.into(),
+    match memory.ambiguous_friction {
+        Some(ambiguous_friction) => ambiguous_friction.into(),
         None => SimulationError::Diverged { step, time, joint },
     }
 }

@@ -333,7 +333,7 @@ impl<const N: usize> Stepper<N> {
                 let time = next.time;
                 self.undo();
                 let why = why(&self.memory, (done as usize, time, joint));
-                self.memory.jam = None;
+                self.memory.ambiguous_friction = None;
                 return Err(why);
             }
         }

@@ -30,7 +30,7 @@ impl<'a, T, const N: usize> Inputs<'a, T, N> {
 
 /// Friction that has no unique solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Jam {
+pub(crate) struct AmbiguousFriction {
     /// Time \[s\].
     pub time: f64,
     /// Zero-based joint.
@@ -39,10 +39,10 @@ pub(crate) struct Jam {
     pub gain: f64,
 }
 
-impl From<Jam> for SimulationError {
-    fn from(jam: Jam) -> Self {
-        let Jam { time, joint, gain } = jam;
-        Self::Jam { time, joint, gain }
+impl From<AmbiguousFriction> for SimulationError {
+    fn from(ambiguous_friction: AmbiguousFriction) -> Self {
+        let AmbiguousFriction { time, joint, gain } = ambiguous_friction;
+        Self::AmbiguousFriction { time, joint, gain }
     }
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct Memory<T> {
     /// The states before a step that may have to be made again.
     pub kept: Vec<States<T>>,
     /// Why a step could not be made.
-    pub jam: Option<Jam>,
+    pub ambiguous_friction: Option<AmbiguousFriction>,
 }
 
 impl<T: Scalar> Memory<T> {
@@ -68,7 +68,7 @@ impl<T: Scalar> Memory<T> {
             rate: zeros.clone(),
             sum: zeros.clone(),
             kept: zeros,
-            jam: None,
+            ambiguous_friction: None,
         }
     }
 }

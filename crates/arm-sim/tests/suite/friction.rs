@@ -116,7 +116,7 @@ fn friction_that_jams_is_refused() {
         experiment.effects.push(friction);
     }
     match simulate(&experiment) {
-        Err(error @ SimulationError::Jam { .. }) => {
+        Err(error @ SimulationError::AmbiguousFriction { .. }) => {
             let said = error.to_string();
             assert!(said.contains("no unique solution"), "{said}");
         }

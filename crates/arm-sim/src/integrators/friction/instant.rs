@@ -31,7 +31,7 @@ pub(crate) struct Solved<const N: usize> {
     /// The joints that stick.
     pub held: [bool; N],
     /// Joint in which the friction has no unique solution, and its loop gain.
-    pub jam: Option<(usize, f64)>,
+    pub ambiguous_friction: Option<(usize, f64)>,
 }
 
 /// Dry friction of all joints.
@@ -199,7 +199,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         let speed = |j: usize| ahead.map_or(0.0, |h| qd[j] / h);
         let mut solved = self.solve(memory, (&modes, ahead));
         for _ in 0..CHANGES {
-            if solved.jam.is_some() {
+            if solved.ambiguous_friction.is_some() {
                 return (modes, solved);
             }
             let other = |j: usize| match modes[j] {
@@ -221,7 +221,7 @@ impl<'a, const N: usize> Arm<'a, N> {
                 .find_map(|j| other(j).map(|m| (j, m)))
             else {
                 if model.feels_joint_force {
-                    solved.jam = self.ambiguous(memory, (&modes, &solved));
+                    solved.ambiguous_friction = self.ambiguous(memory, (&modes, &solved));
                 }
                 return (modes, solved);
             };
@@ -230,7 +230,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         }
         // Where friction does not grow with the joint force, only rounding prevents a solution: either mode is right.
         if model.feels_joint_force {
-            solved.jam = (0..N).find(|&j| open[j]).map(|j| (j, f64::INFINITY));
+            solved.ambiguous_friction = (0..N).find(|&j| open[j]).map(|j| (j, f64::INFINITY));
         }
         (modes, solved)
     }
@@ -311,7 +311,7 @@ impl<'a, const N: usize> Arm<'a, N> {
                 most: found.most,
             },
             held: found.held,
-            jam: found.jam,
+            ambiguous_friction: found.ambiguous_friction,
         }
     }
 
@@ -457,7 +457,7 @@ struct Found<const N: usize> {
     dry: Joints<f64, N>,
     most: [f64; N],
     held: [bool; N],
-    jam: Option<(usize, f64)>,
+    ambiguous_friction: Option<(usize, f64)>,
 }
 
 impl<const N: usize> Rubbing<'_, N> {
@@ -485,7 +485,7 @@ impl<const N: usize> Rubbing<'_, N> {
             dry: sum(&dry, &slips),
             most,
             held,
-            jam: None,
+            ambiguous_friction: None,
         }
     }
 
@@ -513,22 +513,22 @@ impl<const N: usize> Rubbing<'_, N> {
         let any = sticks.contains(&true);
         let stop = self.wanted.map(|w| -w);
         let mut slips = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j]);
-        let (mut jam, mut settled) = (None, false);
+        let (mut ambiguous_friction, mut settled) = (None, false);
         for _ in 0..PASSES {
             let mut response = arm.under(&difference(net, &slips));
             let (mut dry, mut held) = (Joints::zeros(), [false; N]);
             if any {
                 (dry, held) = arm.hold(&mut response, &sticks, &stop);
             }
-            let found = |most, jam| Found {
+            let found = |most, ambiguous_friction| Found {
                 response,
                 dry: sum(&dry, &slips),
                 most,
                 held,
-                jam,
+                ambiguous_friction,
             };
             if settled {
-                return found(most, jam);
+                return found(most, ambiguous_friction);
             }
             let through = arm.through_joints(&response);
             *motion = motion.with_joint_force(&through);
@@ -537,18 +537,18 @@ impl<const N: usize> Rubbing<'_, N> {
             let size = 1.0 + slips.amax();
             // A state that is not finite is reported elsewhere.
             let lost = !missing.iter().all(|m| m.is_finite());
-            if jam.is_some() || lost || missing.amax() <= 1e-12 * size {
-                return found(most, jam);
+            if ambiguous_friction.is_some() || lost || missing.amax() <= 1e-12 * size {
+                return found(most, ambiguous_friction);
             }
             let gains = self.gains(arm, motion, (&response, &through, &most), &sticks);
             let (change, determinant) = newton(&gains, &missing);
             if determinant <= SINGLE {
-                jam = Some(strongest(&gains));
+                ambiguous_friction = Some(strongest(&gains));
                 settled = true;
             }
             slips += change;
         }
-        jam = Some((0, f64::INFINITY));
+        ambiguous_friction = Some((0, f64::INFINITY));
         let mut response = arm.under(&difference(net, &slips));
         let (dry, held) = arm.hold(&mut response, &sticks, &stop);
         Found {
@@ -556,7 +556,7 @@ impl<const N: usize> Rubbing<'_, N> {
             dry: sum(&dry, &slips),
             most,
             held,
-            jam,
+            ambiguous_friction,
         }
     }
 

@@ -25,7 +25,9 @@ use locate::{LOCATED, first_beyond};
 
 use crate::closed_chain::model::{Link, Model};
 use crate::closed_chain::state::{BaseMotion, Input, State};
-use crate::integrators::step::{self, Inputs, Jam, Memory, PROJECTIONS, remember, rk4};
+use crate::integrators::step::{
+    self, AmbiguousFriction, Inputs, Memory, PROJECTIONS, remember, rk4,
+};
 use crate::{Handle, Integrator};
 use arm_core::effect::States;
 
@@ -83,7 +85,7 @@ fn switching<const N: usize>(
         let start = input_at(inputs, h, from);
         let arm = Arm::at(model, &start, (&state.q, &state.qd));
         let (modes, first) = arm.modes(&memory.state, None);
-        if let Some((joint, gain)) = first.jam {
+        if let Some((joint, gain)) = first.ambiguous_friction {
             return stop(start.time, (joint, gain), (state, memory));
         }
         for joint in (0..N).filter(|&j| first.held[j]) {
@@ -276,8 +278,8 @@ fn implicit<const N: usize>(
     (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
 ) {
     let (_, now) = Arm::at(model, start, (&state.q, &state.qd)).modes(&memory.state, Some(h));
-    if let Some(jam) = now.jam {
-        return stop(start.time, jam, (state, memory));
+    if let Some(ambiguous_friction) = now.ambiguous_friction {
+        return stop(start.time, ambiguous_friction, (state, memory));
     }
     remember(model, h, start, (state, memory), &now.outcome);
     let mut power = now.outcome.power;
@@ -307,7 +309,7 @@ fn stop<const N: usize>(
     (joint, gain): (usize, f64),
     (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
 ) {
-    memory.jam = Some(Jam { time, joint, gain });
+    memory.ambiguous_friction = Some(AmbiguousFriction { time, joint, gain });
     state.qd = Joints::repeat(f64::NAN);
 }
 
