@@ -299,11 +299,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 });
                 if let Some(better) = better {
                     exchanges += 1;
-                    let FittedHypothesis {
-                        hypothesis, asked, ..
-                    } = better.fitted.clone();
+                    let better = better.fitted.clone();
                     // A solution that can be followed but not simulated is refused.
-                    if let Ok(settled) = self.settle(hypothesis, asked) {
+                    if let Ok(settled) = self.settle(better.hypothesis, better.asked) {
                         // Others may have stood for what the former one missed.
                         (fitted, point) = self.pruned(settled, calibrated, scale)?;
                         continue 'again;
