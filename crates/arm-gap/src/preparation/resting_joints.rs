@@ -15,7 +15,7 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 /// Share of the samples that must be left when those at which joints with dry friction rest are left out: of a simulated motion, which sticks as
 /// well, half, since whole movements are lost otherwise, and laws that they alone determine;
 const LEAST_LEFT: f64 = 0.5;
-/// of a measured one, which says nothing of friction at rest.
+/// of a measured one, which says nothing of friction at rest. Where it is known joint by joint which rests, nothing must be left.
 const LEAST_LEFT_OF_MEASURED: f64 = 0.15;
 
 impl<const N: usize> PreparedSession<'_, N> {
@@ -41,7 +41,9 @@ impl<const N: usize> PreparedSession<'_, N> {
             ComparisonMode::Led => LEAST_LEFT,
             ComparisonMode::Torque => LEAST_LEFT_OF_MEASURED,
         };
-        if (compared(self) as f64) < least * before as f64 {
+        if !self.session.compares_contact_torques()
+            && (compared(self) as f64) < least * before as f64
+        {
             // Then some joint rests at any time, and imperfect samples are better than none.
             self.compare_rest();
         }
@@ -53,10 +55,10 @@ impl<const N: usize> PreparedSession<'_, N> {
         self.leaves_out_rest() && dry_joints(hypothesis) == [false; N]
     }
 
-    /// Whether nothing is compared at a sample of a movement because a joint with dry friction rests there.
+    /// Whether some joint with dry friction rests at a sample of a movement that was measured.
     pub(crate) fn is_at_rest(&self, group: usize, sample: usize) -> bool {
-        let rest = self.resting.get(group);
-        rest.is_some_and(|rest| rest.left_out.get(sample) == Some(&true))
+        let joints = self.resting.get(group).map_or(&[][..], |r| &r.joints);
+        joints.iter().any(|rests| rests.get(sample) == Some(&true))
     }
 
     /// Compares rest as motion, until other joints are dry.
@@ -142,8 +144,9 @@ impl<const N: usize> PreparedSession<'_, N> {
         }
     }
 
-    /// What the rest of joints with dry friction takes from the comparison of a movement that was measured: the samples at which one of them
-    /// rests in some repeat. What friction holds there is part of both sides of the low-pass, so its neighbours are compared.
+    /// What the rest of joints with dry friction takes from the comparison of a movement that was measured: the torque of a joint while it rests
+    /// in some repeat, and the samples at which all joints do. What friction holds there is part of both sides of the low-pass, so its neighbours
+    /// are compared.
     fn rest_in_motion(&self, point: &LinearizationPoint<N>, group: usize) -> Rest {
         let repeats = std::iter::zip(&self.courses, &self.group_of);
         let repeats: Vec<_> = repeats.filter(|(_, g)| **g == group).collect();
@@ -155,7 +158,7 @@ impl<const N: usize> PreparedSession<'_, N> {
                 std::iter::zip(joint.iter_mut(), own).for_each(|(rests, own)| *rests |= own);
             }
         }
-        let rests = |i: usize| joints.iter().any(|joint| joint[i]);
+        let rests = |i: usize| joints.iter().all(|joint| joint[i]);
         Rest {
             left_out: (0..joints[0].len()).map(rests).collect(),
             observable: Arc::default(),
@@ -186,7 +189,7 @@ impl<const N: usize> PreparedSession<'_, N> {
         if let Some(motion) = course.motion()
             && self.session.compares_contact_torques()
         {
-            limit = limit.max(SMEARED * fastest).max(motion.rest[j]);
+            limit = SLOW.2.max(SMEARED * fastest).max(motion.rest[j]);
         }
         let mut rest: Vec<bool> = speeds.into_iter().map(|v| v <= limit).collect();
         if self.session.comparison == ComparisonMode::Torque {
@@ -290,9 +293,18 @@ mod tests {
         let torques = session.torques(&session.given(), course).expect("torques");
         assert_eq!(torques[1][pause], course.raw[1][pause]);
         assert_ne!(torques[1][stroke], course.raw[1][stroke]);
-        let compared: Vec<usize> = prepared.valid_segments[0].samples().collect();
-        assert!(compared.iter().any(|&i| i.abs_diff(stroke) < 10));
-        assert!(!compared.iter().any(|&i| i.abs_diff(pause) < 15));
+        let compared = |prepared: &PreparedSession<2>, at: usize| {
+            let mut samples = prepared.valid_segments[0].samples();
+            samples.any(|i| i.abs_diff(at) < 10)
+        };
+        assert!(compared(&prepared, stroke) && compared(&prepared, pause));
+        assert!(prepared.is_at_rest(0, pause) && !prepared.is_at_rest(0, stroke));
+        // Where both rest, nothing is compared.
+        let first = Effect::new(Kind::Coulomb, 0).with(&[0.2, 0.01]);
+        let mut both = session.given();
+        both.named.push(first);
+        assert!(prepared.leave_out_rest(&prepared.linearize(&both).expect("torques")));
+        assert!(compared(&prepared, stroke) && !compared(&prepared, pause));
         prepared.compare_rest();
         assert!(prepared.courses[0].at_rest.is_empty());
     }
