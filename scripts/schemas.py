@@ -127,6 +127,7 @@ def subject() -> dict[str, Any]:
     """Return the schemas of the keys of [subject]."""
     return {
         "name": {"type": "string"},
+        "side": {"enum": ["left", "right"], "description": "which arm was measured"},
         "body_mass": number("[kg]", least=1.0, most=500.0),
         "height": number("[m]", least=0.3, most=3.0),
         "sex": {"enum": ["male", "female"]},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 
 from armrs import BadInput, cli
-from armrs.report import clinic_page, session_changes
+from armrs.report import clinic_lines, clinic_next, clinic_norms, clinic_page, clinic_trends, session_changes
 from armrs.report.sentences import verdict
 
 NORMS = """\
@@ -52,27 +53,27 @@ def result(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
-def norms(tmp_path: Path) -> tuple[clinic_page.Norm, ...]:
+def norms(tmp_path: Path) -> tuple[clinic_norms.Norm, ...]:
     (tmp_path / "norms.toml").write_text(NORMS, encoding="utf-8")
-    return clinic_page.load_norms(tmp_path / "norms.toml")
+    return clinic_norms.load_norms(tmp_path / "norms.toml")
 
 
-def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic_page.Norm, ...]) -> None:
-    stiffness, rest, friction, speed = clinic_page.lines_of(result(), norms)
+def test_values_are_in_the_units_of_the_bedside(norms: tuple[clinic_norms.Norm, ...]) -> None:
+    stiffness, rest, friction, speed = clinic_lines.lines_of(result(), norms)
     assert stiffness.value == pytest.approx(1.8 * math.radians(10.0))
     assert rest.value == pytest.approx(math.degrees(-1.0))
-    assert clinic_page.words_of(stiffness) == [
+    assert clinic_lines.words_of(stiffness) == [
         "shoulder", "Stiffness [N m per 10°]", "0.314", "0.283 to 0.346", "0.087 to 0.244, above it", "higher by 0.157 ± 0.048 (+100 %)",
     ]  # fmt: skip
-    assert clinic_page.words_of(friction)[2:4] == ["none seen", "at most 0.030"]
-    assert speed.value is None and clinic_page.words_of(speed)[2:4] == ["not measured", ""]
+    assert clinic_lines.words_of(friction)[2:4] == ["none seen", "at most 0.030"]
+    assert speed.value is None and clinic_lines.words_of(speed)[2:4] == ["not measured", ""]
 
 
-def test_angles_are_counted_as_in_the_laboratory(norms: tuple[clinic_page.Norm, ...]) -> None:
+def test_angles_are_counted_as_in_the_laboratory(norms: tuple[clinic_norms.Norm, ...]) -> None:
     """A laboratory with the arm hanging at zero and clockwise positive read our horizontal zero."""
     as_there = {"signs": [-1, 1], "zero_deg": [-90.0, 0.0], "words": "as in the laboratory: hanging"}
     found = result(data=result()["data"] | {"angles": as_there})
-    _, rest, *_ = clinic_page.lines_of(found, norms)
+    _, rest, *_ = clinic_lines.lines_of(found, norms)
     assert rest.value == pytest.approx(-(math.degrees(-1.0) + 90.0))
     assert rest.interval == pytest.approx((-(math.degrees(-0.9) + 90.0), -(math.degrees(-1.1) + 90.0)))
     said = clinic_page.measured([found])
@@ -86,7 +87,7 @@ def test_what_is_followed_is_drawn_as_the_table_counts_it() -> None:
     stiffness = result()["history"][0]
     rest = stiffness | {"name": "rest", "values": [-1.0, -0.9], "stds": [0.1, 0.2]}
     other = stiffness | {"kind": "segment", "name": "m1*l1"}
-    one, two = clinic_page.followed([result(data=result()["data"] | {"angles": as_there}, history=[stiffness, rest, other])])
+    one, two = clinic_trends.followed([result(data=result()["data"] | {"angles": as_there}, history=[stiffness, rest, other])])
     assert (one["name"], one["joint"], one["unit"]) == ("shoulder: stiffness", None, "N m per 10°")
     assert one["values"] == pytest.approx([0.9 * math.radians(10.0), 1.8 * math.radians(10.0)])
     assert two["name"] == "shoulder: resting angle"
@@ -110,23 +111,103 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
     assert "resting angle differs" not in text
 
 
-def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic_page.Norm, ...], tmp_path: Path) -> None:
-    """What changed, by how much, whether that is sure and what next are what a therapist asks; the page said it under "unusual"."""
+def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic_norms.Norm, ...], tmp_path: Path) -> None:
+    """What changed, by how much, whether that is sure and what next are what a therapist asks: it comes before the table."""
     change = result()["history"][0]
     same = change | {"name": "torque", "kind": "coulomb", "since_last": 0.01, "since_last_std": 0.02, "changed_since_last": False}
-    lines = clinic_page.lines_of(result(history=[change, same]), norms)
+    lines = clinic_lines.lines_of(result(history=[change, same]), norms)
     assert session_changes.change_lines(lines) == [
         "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",
         session_changes.SURE,
         "No clear change: shoulder (friction).",
         session_changes.EITHER_WAY,
     ]
-    assert clinic_page.words_of(lines[2])[5] == "no clear change: +0.010 ± 0.039"
-    assert session_changes.change_lines(clinic_page.lines_of(result(history=[]))) == []
+    assert clinic_lines.words_of(lines[2])[5] == "no clear change: +0.010 ± 0.039"
+    assert session_changes.change_lines(clinic_lines.lines_of(result(history=[]))) == []
     (tmp_path / "a.json").write_text(json.dumps(result(history=[change, same])), encoding="utf-8")
     page = clinic_page.write_summary([tmp_path / "a.json"], tmp_path / "s.html").read_text(encoding="utf-8")
-    heads = [page.index(head) for head in ("What changed since", "What was found", "Over the sessions", "What next")]
+    heads = [page.index(head) for head in ("What changed since", "What next", "What was found", "Over the sessions")]
     assert heads == sorted(heads)
+
+
+def compared(value: float, std: float, *, clear: bool, date: str = "2026-01-02") -> dict[str, Any]:
+    return {"date": date, "value": value, "std": std, "p_value": 0.01 if clear else 0.5, "clear": clear}
+
+
+def kept(side: str = "left", **sessions: dict[str, Any]) -> dict[str, Any]:
+    """A result that a history keeps, with what its stiffness is compared with."""
+    course = result()["history"][0] | {
+        "dates": ["2026-01-02", "2026-02-02", "2026-03-02"],
+        "values": [0.9, 1.2, 1.8],
+        "stds": [0.1, 0.1, 0.1],
+    }
+    session = {"subject": "S1", "side": side, "date": "2026-03-02", "later": ["2026-04-02"]}
+    return result(history=[course | sessions], session=session, data=result()["data"] | {"side": side})
+
+
+def test_a_page_names_the_sessions_that_it_compares(tmp_path: Path) -> None:
+    """The page of a session that was added later stated the change of another session."""
+    sessions = {
+        "before": compared(0.6, 0.14, clear=True, date="2026-02-02"),
+        "first": compared(0.9, 0.14, clear=True),
+        "other_arm": compared(-0.2, 0.14, clear=False, date="2026-02-28"),
+    }
+    (tmp_path / "a.json").write_text(json.dumps(kept(**sessions)), encoding="utf-8")
+    page = clinic_page.write_summary([tmp_path / "a.json"], tmp_path / "s.html").read_text(encoding="utf-8")
+    for words in (
+        "Arm measurement: S1, left arm, 2026-03-02",
+        "This session of the left arm is compared with the session before it (2026-02-02), the first one (2026-01-02) and the right arm "
+        "(2026-02-28). Later sessions (2026-04-02) are not compared.",
+        "<h2>What changed since 2026-02-02</h2>",
+        "shoulder: stiffness is higher by 0.105 ± 0.048 N m per 10° (+50 %).",
+        "<h2>Since the first session, 2026-01-02</h2>",
+        "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",
+        "<h2>Compared with the right arm on 2026-02-28</h2>",
+        "No clear difference: shoulder (stiffness).",
+    ):
+        assert words in page
+    other = kept(side="right", **sessions)
+    (tmp_path / "b.json").write_text(json.dumps(other), encoding="utf-8")
+    with pytest.raises(BadInput, match="side: found 'right', allowed that of the others, 'left': one page is of one session"):
+        clinic_page.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html")
+
+
+def test_what_is_beyond_its_own_interval_alone_is_called_perhaps() -> None:
+    """A change larger than its ± stood beside `no clear change`."""
+    (line, *_) = clinic_lines.lines_of(kept(before=compared(0.3, 0.14, clear=False, date="2026-02-02")))
+    assert line.trend == "perhaps higher: +0.052 ± 0.048"
+    said = session_changes.change_lines([line])
+    assert said[0].startswith("Perhaps: shoulder: stiffness +0.052 ± 0.048 N m per 10°. This is more than its ±, but")
+
+
+def test_repeats_that_make_a_change_certain_are_computed_from_its_deviation() -> None:
+    """By hand: with s = 0.1 in both sessions and one quantity, a change of 0.25 needs s²/n' = (0.25/1.96)² − s², n' = 1.6 n."""
+    change = session_changes.Change(0.25, 1.96 * math.hypot(0.1, 0.1), None, False, "2026-01-02", 1, 0.1)
+    assert clinic_next.repeats_needed(change, 10) == math.ceil(10 * 0.01 / ((0.25 / 1.95996) ** 2 - 0.01)) == 16
+    # Of several quantities, chance makes one large more easily.
+    assert clinic_next.repeats_needed(dataclasses.replace(change, compared=2), 10) > 16
+    # The session before alone is too uncertain: no number of repeats helps.
+    assert clinic_next.repeats_needed(dataclasses.replace(change, value=0.19), 10) == math.inf
+
+
+def test_what_next_is_made_of_the_figures_of_the_result() -> None:
+    found = kept(before=compared(0.25, 0.14, clear=False, date="2026-02-02"))
+    found["data"] |= {"warnings": ["slow_1: joint 1 has missing samples"]}
+    lines = clinic_lines.lines_of(found)
+    said = clinic_next.next_steps([found], lines)
+    assert said[0] == "Mend before the next session: slow_1: shoulder has missing samples."
+    assert said[1].startswith("shoulder, stiffness: about 8 repeats of each movement instead of 5 would make a change of this size certain")
+    assert said[2] == "Measure the right arm in the same way, into the same history: the page then compares both arms."
+    stretches = [{"joint": 2, "configuration": f"v{k}", "speed": 0.3 * k} for k in (1, 2, 3)]
+    effect = {"joint": 2, "decided": False, "parameters": {}}
+    reflex = found | {"verb": "spasticity", "effects": [effect], "stretches": stretches, "history": []}
+    assert clinic_next.next_steps([reflex], [])[1].startswith("elbow: no reflex up to 52 °/s. Only faster stretches can show one")
+    effect |= {"decided": True, "parameters": {"threshold": {"value": 0.8}}}
+    assert clinic_next.next_steps([reflex], [])[1].startswith(
+        "elbow: only 1 of 3 speeds was above the reflex onset of 46 °/s (fastest 52 °/s). Add faster stretches"
+    )
+    active = reflex | {"data": reflex["data"] | {"warnings": ["v3_1: muscles are active for 1.2 s; left out"]}}
+    assert not any("muscles" in line for line in clinic_next.next_steps([active], []))
 
 
 def test_a_share_of_an_angle_is_not_stated() -> None:
@@ -137,12 +218,12 @@ def test_a_share_of_an_angle_is_not_stated() -> None:
     assert session_changes.trend(0.0, 0.00999, None, clear=False) == "no clear change: +0.000 ± 0.010"
 
 
-def test_what_is_unusual_is_said_in_words(norms: tuple[clinic_page.Norm, ...]) -> None:
-    said = clinic_page.unusual(clinic_page.lines_of(result(), norms))
+def test_what_is_unusual_is_said_in_words(norms: tuple[clinic_norms.Norm, ...]) -> None:
+    said = clinic_page.unusual(clinic_lines.lines_of(result(), norms))
     assert said == [
         "shoulder: stiffness is above the usual range.",
     ]
-    assert clinic_page.unusual(clinic_page.lines_of(result(history=[]))) == []
+    assert clinic_page.unusual(clinic_lines.lines_of(result(history=[]))) == []
     left = [{"verb": "gap", "verdict": verdict} for verdict in ("explained", "unexplained")]
     assert clinic_page.unusual([], left[:1]) == []
     assert clinic_page.unusual([], left) == [
@@ -177,8 +258,8 @@ def test_a_slip_and_a_tremor_are_unusual_and_a_spring_is_not() -> None:
 
 
 @pytest.mark.parametrize(("value", "said"), [(0.6, "within"), (0.5, "not clear"), (0.1, "below"), (3.0, "above")])
-def test_the_interval_is_compared_with_the_norm_not_the_value(value: float, said: str, norms: tuple[clinic_page.Norm, ...]) -> None:
-    lines = clinic_page.lines_of(result(parameters=[estimate("elastic", "stiffness", 1, value, 0.05)]), norms)
+def test_the_interval_is_compared_with_the_norm_not_the_value(value: float, said: str, norms: tuple[clinic_norms.Norm, ...]) -> None:
+    lines = clinic_lines.lines_of(result(parameters=[estimate("elastic", "stiffness", 1, value, 0.05)]), norms)
     assert [line.beside_norm for line in lines] == [said]
 
 
@@ -198,8 +279,8 @@ def test_the_verb_writes_one_page(norms: object, tmp_path: Path, capsys: pytest.
         "before acting on a change",
     ):
         assert words in page
-    # What was found, and its course over the sessions.
-    assert page.count('src="data:image/png') == 2
+    # The course over the sessions, with what is usual behind it: one sheet has no room for a figure of the last values alone as well.
+    assert page.count('src="data:image/png') == 1 and "Grey: what is usual." in page
 
 
 def test_intervals_claim_no_more_than_holds(tmp_path: Path) -> None:
@@ -230,8 +311,8 @@ def test_a_resistance_that_may_be_none_is_told_as_a_limit() -> None:
     curve = {"joint": 1, "configuration": "slow", "repeats": 3, "half_width_mean_Nm": 0.06, "half_width_interval_Nm": [-0.03, 0.15]}
     # The movement with an interval is known better than one with more repeats that share no angle.
     other = {**curve, "configuration": "fast", "repeats": 4, "half_width_mean_Nm": 0.3, "half_width_interval_Nm": [None, None]}
-    (line,) = clinic_page.lines_of(result(verb="passive", curves=[other, curve], history=[]))
-    assert clinic_page.words_of(line)[2:4] == ["none seen", "at most 0.150"]
+    (line,) = clinic_lines.lines_of(result(verb="passive", curves=[other, curve], history=[]))
+    assert clinic_lines.words_of(line)[2:4] == ["none seen", "at most 0.150"]
     named = {**curve, "joint_name": "shoulder"}
     assert (
         verdict({"verb": "passive", "curves": [named]})
@@ -265,5 +346,5 @@ def test_norms_are_refused_with_their_place(tmp_path: Path) -> None:
     ):
         (tmp_path / "n.toml").write_text(NORMS.replace(old, new), encoding="utf-8")
         with pytest.raises(BadInput, match=message):
-            clinic_page.load_norms(tmp_path / "n.toml")
+            clinic_norms.load_norms(tmp_path / "n.toml")
     assert cli.main(["report", "x.json", "--norms", "n.toml"]) == 2

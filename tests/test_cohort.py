@@ -13,7 +13,7 @@ from armrs import BadInput
 from armrs.analysis import mixed_model
 from armrs.cli import main
 from armrs.io import files
-from armrs.report import clinic_sentences
+from armrs.report import clinic_norms, clinic_sentences
 
 SEED = 7101
 
@@ -72,23 +72,23 @@ def test_groups_and_sides_that_differ_are_told(tmp_path: Path) -> None:
             own = mean + 0.2 * draw.standard_normal()
             lines += [
                 f"{group}{k},{group},{side},half width,{own + more + 0.05 * draw.standard_normal()}"
-                for side, more in (("l", 0.0), ("r", right))
+                for side, more in (("Links", 0.0), ("R", right))
             ]
     (tmp_path / "t.csv").write_text("\n".join(lines))
     found = armrs.cohort(tmp_path / "t.csv")
     differ = {(*c.between, c.within): c for c in found.contrasts}
-    assert set(differ) == {("control", "patient", ""), ("l", "r", "control"), ("l", "r", "patient")}
+    assert set(differ) == {("control", "patient", ""), ("left", "right", "control"), ("left", "right", "patient")}
     groups = differ["control", "patient", ""]
     assert groups.p_value < 1e-4 and groups.difference == pytest.approx(0.8, abs=0.2)
     # Within subjects the sides are told far better than their scatter between subjects would.
-    sides = differ["l", "r", "patient"]
+    sides = differ["left", "right", "patient"]
     assert sides.difference == pytest.approx(0.4, abs=0.04) and sides.std < 0.03 and sides.p_value < 1e-4
-    assert differ["l", "r", "control"].p_value > 0.05
+    assert differ["left", "right", "control"].p_value > 0.05
     bands = {(q.group, q.side): q for q in found.quantities}
-    assert len(bands) == 4 and bands["control", "l"].within_std == pytest.approx(0.05, rel=0.3)
-    assert len(found.values_of(bands["patient", "r"])) == 15
+    assert len(bands) == 4 and bands["control", "left"].within_std == pytest.approx(0.05, rel=0.3)
+    assert len(found.values_of(bands["patient", "right"])) == 15
     said = clinic_sentences.verdict(found.to_dict() | {"verb": "cohort"})
-    assert "higher in patient than in control and higher in r than in l (group patient)" in said
+    assert "higher in patient than in control and higher in right than in left (group patient)" in said
 
 
 def test_differences_of_sides_within_subjects_have_the_p_value_of_a_paired_t_test(tmp_path: Path) -> None:
@@ -150,9 +150,77 @@ def test_a_folder_of_results_is_read_with_its_groups(slow_arm: Path, tmp_path: P
         ("subject,quantity,value\n,k,1\n", "row 2, subject"),
         ("subject,quantity,value\n", "a value a row"),
         ("subject,quantity,value,unit\na,k,1,N m\nb,k,1,kN m\n", "one unit a quantity"),
+        ("subject,quantity,value\na,k,0,5\n", r"row 2: found 4 cells, allowed 3, as the first row \(a decimal comma\? Put semicolons"),
+        ("subject;quantity;value\na;k;0,5\nb;k;0.75\n", "row 3, value: found '0.75', allowed a number .* with a decimal comma"),
+        (
+            "subject;quantity;value;side\na;k;1;Links\nb;k;1;paretisch\n",
+            "row 3, side: found 'paretisch', allowed left l links li or right r rechts re in any case, or nothing",
+        ),
     ],
 )
 def test_refused_tables(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "t.csv").write_text(text)
     with pytest.raises(BadInput, match=message):
         armrs.cohort(tmp_path / "t.csv")
+
+
+def test_a_table_of_a_spreadsheet_is_read_as_one_in_english(tmp_path: Path) -> None:
+    """Semicolons and decimal commas were refused, and `L`, `links` and `Left` were three sides, which nothing compared."""
+    words = {"left": ("L", "links", "Left"), "right": ("R", "rechts", "Right")}
+    rows = [(f"s{k}", side, 1.0 + 0.125 * k + more) for k in range(6) for side, more in (("left", 0.0), ("right", 0.5))]
+    plain = ["subject,side,quantity,value", *(f"{who},{side},stiffness,{value}" for who, side, value in rows)]
+    (tmp_path / "plain.csv").write_text("\n".join(plain))
+    local = [f"{who};{words[side][k % 3]};stiffness;{value:.3f}".replace(".", ",") for k, (who, side, value) in enumerate(rows)]
+    (tmp_path / "local.csv").write_bytes("\r\n".join(["Subject;Side;Quantity;Value;;", *local, ";;;;;"]).encode("utf-16"))
+    one, two = armrs.cohort(tmp_path / "plain.csv"), armrs.cohort(tmp_path / "local.csv")
+    assert one.values == two.values and [c.between for c in two.contrasts] == [("left", "right")]
+
+
+def test_values_without_a_side_among_others_are_told(tmp_path: Path) -> None:
+    rows = [f"s{k},{side},k,{k}" for k in range(4) for side in ("left", "right")]
+    (tmp_path / "t.csv").write_text("\n".join(["subject,side,quantity,value", *rows, "s9,,k,1"]))
+    (line,) = armrs.cohort(tmp_path / "t.csv").warnings
+    assert line == "k: 1 of 9 values state no side: sides are not compared"
+
+
+def test_norm_bands_become_usual_ranges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Norm bands could not be used on the page for a clinician but by copying them."""
+    draw = np.random.default_rng(SEED)
+    lines = ["subject,group,side,quantity,unit,value"]
+    for group, mean in (("healthy", 1.0), ("after stroke", 2.0)):
+        for k in range(8):
+            for side in ("left", "right"):
+                for what, unit in (
+                    ("elastic stiffness of joint 2", "N m/rad"),
+                    ("passive half_width in slow of joint 1", "N m"),
+                    ("grip", "N"),
+                ):
+                    lines.append(f"{group}{k},{group},{side},{what},{unit},{mean + 0.1 * draw.standard_normal()}")
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    assert main(["cohort", str(tmp_path / "t.csv"), "-o", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert f"Next: armrs report RESULT.json --summary --norms {tmp_path / 'out' / 'norms-healthy.toml'} -o clinic" in said
+    found = {norm: norm for norm in clinic_norms.load_norms(tmp_path / "out" / "norms-healthy.toml")}
+    assert {(n.kind, n.name, n.joint, n.movement, n.side) for n in found} == {
+        (kind, name, joint, movement, side)
+        for kind, name, joint, movement in (("elastic", "stiffness", 2, None), ("passive", "half_width", 1, "slow"))
+        for side in ("left", "right")
+    }
+    band = next(q for q in armrs.cohort(tmp_path / "t.csv").quantities if (q.name[:7], q.group, q.side) == ("elastic", "healthy", "left"))
+    assert (band.norm, "armrs cohort t: 8 subjects of group healthy, 8 sessions") in {((n.low, n.high), n.source) for n in found}
+    assert (tmp_path / "out" / "norms-after-stroke.toml").is_file()
+    left = {"data": {"side": "left"}}
+    assert set(clinic_norms.usual_of(list(found), left)) == {("elastic", "stiffness", 2)}
+    assert set(clinic_norms.usual_of(list(found), left, "slow")) == {("elastic", "stiffness", 2), ("passive", "half_width", 1)}
+    assert not clinic_norms.usual_of(list(found), {"data": {"side": None}}, "slow")
+
+
+def test_a_row_of_nobody_in_the_groups_is_told(slow_arm: Path, tmp_path: Path) -> None:
+    main(["passive", str(slow_arm), "--json", str(tmp_path / "results" / "r.json")])
+    (tmp_path / "groups.csv").write_text("subject;group;side\nslow arm;a;links\nslow am;b;\n")
+    found = armrs.cohort(tmp_path / "results", groups=tmp_path / "groups.csv")
+    assert {v.side for v in found.values} == {"left"}
+    assert found.warnings[0].endswith("row 3, subject: found 'slow am', allowed slow arm: it is in no result")
+    (tmp_path / "results" / "r.json").write_text('{"verb": "passive", "data": {"name": "x"}}')
+    with pytest.raises(BadInput, match="content: found not what a result holds"):
+        armrs.cohort(tmp_path / "results")

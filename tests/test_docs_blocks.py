@@ -23,6 +23,7 @@ from test_docs import DOCS, ROOT, blocks
 SHELL = ("sh", "text")
 RUN_ELSEWHERE = {
     "tutorial.md": "test_demo.py, in order",
+    "patient.md": "test_patient_page.py, in order, with what it quotes",
     "files.md": "test_docs.py reads every file that is shown",
     "firmware.md": "scripts/walkthrough.py, by make crosscheck; test_export_c.py its first commands; its Python below",
     "index.md": "make demo, which builds",

@@ -17,7 +17,9 @@ import pytest
 import armrs
 from armrs import BadInput, Identified
 from armrs.cli import main
+from armrs.workflows import courses
 from armrs.workflows import history as sessions
+from sessions import again, folder_again
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +41,9 @@ def test_a_change_is_found_and_the_rest_is_not(identified: Identified, tmp_path:
     file = tmp_path / "subject.sqlite"
     std = next(sessions._deviation(e, 0.95) for e in identified.combinations if e.name == "m2*l2")
     for k, date in enumerate(("2026-01-05", "2026-02-03", "2026-03-04")):
-        courses = sessions.add(file, moved(identified, {"m2*l2": 0.2 * k * std}), date).courses
+        courses = sessions.add(file, again(moved(identified, {"m2*l2": 0.2 * k * std}), k), date).courses
         assert not any(c.changed for c in courses)
-    courses = sessions.add(file, moved(identified, {"m2*l2": 8.0 * std}), "2026-04-02").courses
+    courses = sessions.add(file, again(moved(identified, {"m2*l2": 8.0 * std}), 3), "2026-04-02").courses
     assert [c.label for c in courses if c.changed] == ["m2·l2"]
     course = next(c for c in courses if c.name == "m2*l2")
     assert course.dates == ("2026-01-05", "2026-02-03", "2026-03-04", "2026-04-02")
@@ -53,8 +55,8 @@ def test_no_more_than_one_in_twenty_is_called_changed() -> None:
     draw = np.random.default_rng(8)
     false = 0
     for _ in range(400):
-        p_values = [sessions._change([("d", draw.standard_normal(), 1.0, 0) for _ in range(3)])[2] for _ in range(8)]
-        false += min(sessions.holm(p_values)) < 0.05
+        p_values = [courses.change([("d", draw.standard_normal(), 1.0, 0) for _ in range(3)])[2] for _ in range(8)]
+        false += min(courses.holm(p_values)) < 0.05
     assert false / 400 < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 400)
 
 
@@ -62,7 +64,7 @@ def test_sessions_compare_when_the_data_decided_the_same(identified: Identified,
     file = tmp_path / "subject.sqlite"
     bound = tuple(e.replace(decided_by="bound") if (e.name, e.joint) == ("torque", 2) else e for e in identified.parameters)
     sessions.add(file, dataclasses.replace(identified, result=identified.result.replace(parameters=bound)), "2026-01-05")
-    courses = sessions.add(file, identified, "2026-02-03").courses
+    courses = sessions.add(file, again(identified, 1), "2026-02-03").courses
     alone = [(c.kind, c.joint) for c in courses if np.isnan(c.change)]
     assert ("coulomb", 2) in alone and ("coulomb", 1) not in alone and ("combination", None) not in alone
 
@@ -72,8 +74,8 @@ def test_the_same_session_replaces_itself_and_order_is_by_date(identified: Ident
     assert not sessions.add(file, identified, "2026-03-01").warnings
     (line,) = sessions.add(file, identified, "2026-03-01").warnings
     assert "on 2026-03-01 is replaced" in line
-    courses = sessions.add(file, identified, "2026-01-01").courses
-    assert all(c.dates == ("2026-01-01", "2026-03-01") and c.change == 0.0 for c in courses)
+    sessions.add(file, again(identified, 1), "2026-01-01")
+    assert all(c.dates == ("2026-01-01", "2026-03-01") and c.change == 0.0 for c in sessions.read(file).courses)
 
 
 def test_a_result_without_intervals_takes_no_place(identified: Identified, tmp_path: Path) -> None:
@@ -91,13 +93,13 @@ def test_a_result_without_intervals_takes_no_place(identified: Identified, tmp_p
 def test_a_session_in_another_unit_is_told(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A history whose units were altered was compared without these sessions, and nothing said so."""
     file = tmp_path / "s.sqlite"
-    verb = ["identify", str(slow_arm), "--with", "coulomb", "--json", str(tmp_path / "r.json"), "--history", str(file), "--date"]
-    assert main([*verb, "2026-01-01"]) == 0
+    verb = ["--with", "coulomb", "--json", str(tmp_path / "r.json"), "--history", str(file), "--date"]
+    assert main(["identify", str(slow_arm), *verb, "2026-01-01"]) == 0
     with contextlib.closing(sqlite3.connect(file)) as connection:
         connection.execute("UPDATE estimate SET unit = 'N mm' WHERE kind = 'coulomb' AND joint = 2")
         connection.commit()
     capsys.readouterr()
-    assert main([*verb, "2026-02-01"]) == 0
+    assert main(["identify", str(folder_again(slow_arm, tmp_path / "again")), *verb, "2026-02-01"]) == 0
     said = "warning: history, coulomb torque of joint 2: found 'N mm' on 2026-01-01, allowed 'N m' as in the last session: not compared"
     assert [line for line in capsys.readouterr().err.splitlines() if "history" in line] == [said]
     courses = json.loads((tmp_path / "r.json").read_text())["history"]
@@ -106,9 +108,9 @@ def test_a_session_in_another_unit_is_told(slow_arm: Path, tmp_path: Path, capsy
 
 def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "s.sqlite"
-    for date in ("2026-01-01", "2026-02-01"):
+    for folder, date in ((slow_arm, "2026-01-01"), (folder_again(slow_arm, tmp_path / "again"), "2026-02-01")):
         out = ["-o", str(tmp_path / "out"), "--json", str(tmp_path / "r.json")]
-        assert main(["identify", str(slow_arm), "--with", "coulomb", "--history", str(file), "--date", date, *out]) == 0
+        assert main(["identify", str(folder), "--with", "coulomb", "--history", str(file), "--date", date, *out]) == 0
     assert "Over the sessions" in capsys.readouterr().out
     history = json.loads((tmp_path / "r.json").read_text())["history"]
     assert {"m2*l2", "torque"} <= {h["name"] for h in history} and all(h["dates"] == ["2026-01-01", "2026-02-01"] for h in history)
@@ -116,8 +118,9 @@ def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def named(result: Identified, name: str, subject: str | None = None) -> Identified:
-    """The same result of a data set of another name, or of a subject that is named."""
-    return dataclasses.replace(result, dataset=result.dataset.replace(name=name, subject=armrs.Subject(name=subject)))
+    """The same result of another recording of another name, or of a subject that is named."""
+    other = again(result, len(name))
+    return dataclasses.replace(other, dataset=other.dataset.replace(name=name, subject=armrs.Subject(name=subject)))
 
 
 def test_the_history_of_another_subject_is_refused(identified: Identified, tmp_path: Path) -> None:
@@ -170,7 +173,7 @@ def test_a_session_stays_only_if_everything_else_was_written(identified: Identif
     assert not (tmp_path / "a").exists()
     file = tmp_path / "s.sqlite"
     sessions.add(file, identified, "2026-01-01")
-    with pytest.raises(OSError, match="full"), sessions.adding(file, identified, "2026-02-01") as followed:
+    with pytest.raises(OSError, match="full"), sessions.adding(file, again(identified, 1), "2026-02-01") as followed:
         assert followed.courses[0].dates == ("2026-01-01", "2026-02-01")
         raise OSError("full")
     assert all(course.dates == ("2026-01-01",) for course in sessions.read(file).courses)
@@ -295,7 +298,7 @@ def test_additions_at_the_same_time_all_stay(identified: Identified, tmp_path: P
     file = tmp_path / "one.sqlite"
     dates = [f"2026-03-{day:02d}" for day in range(1, 13)]
     with ThreadPoolExecutor(max_workers=len(dates)) as pool:
-        list(pool.map(lambda date: sessions.add(file, identified, date), dates))
+        list(pool.map(lambda k: sessions.add(file, again(identified, k), dates[k]), range(len(dates))))
     assert set(sessions.read(file).courses[0].dates) == set(dates)
 
 
@@ -306,10 +309,94 @@ def test_a_kill_while_a_history_is_made_leaves_one_that_is_accepted(identified: 
     child = os.fork()
     if child == 0:  # the process that is killed in the midst of its transaction
         connection = sqlite3.connect(file)
-        connection.executescript(f"BEGIN IMMEDIATE; PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA} {sessions._WHOSE}")
+        connection.executescript(
+            f"BEGIN IMMEDIATE; PRAGMA application_id = {sessions.APPLICATION}; {sessions._SCHEMA} {sessions._WHOSE} {sessions._ARM}"
+        )
         if after == "_insert":
             sessions._insert(connection, identified, "2026-03-01")
         os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(child, 0)
     sessions.add(file, identified, "2026-03-02")
     assert sessions.read(file).courses[0].dates == ("2026-03-02",)
+
+
+def test_a_session_that_is_added_later_is_compared_with_the_one_before_it(identified: Identified, tmp_path: Path) -> None:
+    """The page of a session of January that was added in April stated the change of April."""
+    file = tmp_path / "s.sqlite"
+    std = next(sessions._deviation(e, 0.95) for e in identified.combinations if e.name == "m2*l2")
+    for k, date in enumerate(("2026-01-05", "2026-03-04", "2026-04-02")):
+        sessions.add(file, again(moved(identified, {"m2*l2": 10.0 * k * std}), k), date)
+    found = sessions.add(file, again(moved(identified, {"m2*l2": 4.0 * std}), 3), "2026-02-03")
+    course = next(c for c in found.courses if c.name == "m2*l2")
+    assert (found.date, course.dates, found.later) == ("2026-02-03", ("2026-01-05", "2026-02-03"), ("2026-03-04", "2026-04-02"))
+    assert course.before.date == course.first.date == "2026-01-05" and course.since_last == pytest.approx(4.0 * std)
+    assert found.warnings == ("history: 2026-02-03 is compared with earlier sessions only, not with 2026-03-04, 2026-04-02",)
+    last = next(c for c in sessions.read(file).courses if c.name == "m2*l2")
+    assert (last.before.date, last.first.date) == ("2026-03-04", "2026-01-05")
+    assert (last.before.value, last.first.value) == (pytest.approx(10.0 * std), pytest.approx(20.0 * std))
+
+
+def of_side(result: Identified, side: str | None, number: int) -> Identified:
+    """The result of another recording of one arm, by the same name."""
+    other = again(result, number)
+    return dataclasses.replace(other, dataset=other.dataset.replace(side=side))
+
+
+def test_sessions_compare_with_those_of_the_same_arm_and_with_the_other_one(identified: Identified, tmp_path: Path) -> None:
+    """Left and right of one day have the same name; the second took the place of the first."""
+    file = tmp_path / "s.sqlite"
+    std = next(sessions._deviation(e, 0.95) for e in identified.combinations if e.name == "m2*l2")
+    number = 0
+    for date, left, right in (("2026-01-05", 0.0, 20.0), ("2026-02-03", 9.0, 20.5)):
+        for side, by in (("left", left), ("right", right)):
+            number += 1
+            found = sessions.add(file, of_side(moved(identified, {"m2*l2": by * std}), side, number), date)
+    course = next(c for c in found.courses if c.name == "m2*l2")
+    assert found.side == "right" and course.dates == ("2026-01-05", "2026-02-03") and not course.changed_since_last
+    assert course.since_last == pytest.approx(0.5 * std)
+    assert course.other_arm.date == "2026-02-03" and course.other_arm.value == pytest.approx(11.5 * std) and course.other_arm.clear
+    left = sessions.add(file, of_side(moved(identified, {"m2*l2": 9.0 * std}), "left", 3), "2026-02-03")
+    course = next(c for c in left.courses if c.name == "m2*l2")
+    assert course.changed_since_last and course.since_last == pytest.approx(9.0 * std)
+    assert "is replaced" in left.warnings[-1]
+
+
+def test_a_side_that_is_stated_later_takes_the_place_of_none(identified: Identified, tmp_path: Path) -> None:
+    file = tmp_path / "s.sqlite"
+    sessions.add(file, identified, "2026-01-05")
+    found = sessions.add(file, of_side(identified, "left", 1), "2026-02-03")
+    assert all(np.isnan(c.since_last) for c in found.courses)
+    (line,) = found.warnings
+    assert line.startswith("history, side: found none on 2026-01-05, allowed left as in this session: not compared; state it in [subject]")
+    (none,) = sessions.add(file, again(identified, 2), "2026-03-01").warnings
+    assert none.startswith("history, side: found none in this session, allowed left as on 2026-02-03")
+    sessions.add(file, dataclasses.replace(identified, dataset=identified.dataset.replace(side="left")), "2026-01-05")
+    found = sessions.add(file, of_side(identified, "left", 1), "2026-02-03")
+    assert all(c.dates == ("2026-01-05", "2026-02-03") for c in found.courses)
+
+
+def test_one_recording_is_one_session(identified: Identified, slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same files with another date counted as a second session, in which nothing had changed."""
+    file = tmp_path / "s.sqlite"
+    sessions.add(file, identified, "2026-01-05")
+    said = r"found the recording that it has as 'slow arm' on 2026-01-05, sample for sample, allowed another recording for the session on"
+    with pytest.raises(BadInput, match=said):
+        sessions.add(file, identified, "2026-02-03")
+    assert main(["passive", str(slow_arm), "--history", str(file), "--date", "2026-02-03", "-o", str(tmp_path / "out")]) == 2
+    assert "(--date 2026-01-05 replaces that result)" in capsys.readouterr().err and not (tmp_path / "out").exists()
+    sessions.add(tmp_path / "sides.sqlite", of_side(identified, "left", 0), "2026-01-05")
+    with pytest.raises(
+        BadInput, match="of the left arm, sample for sample, allowed another recording for the session on 2026-01-05 of the right"
+    ):
+        sessions.add(tmp_path / "sides.sqlite", of_side(identified, "right", 0), "2026-01-05")
+    # By another name on the same day it is the same session.
+    renamed = dataclasses.replace(identified, dataset=identified.dataset.replace(name="slow arm b", subject=armrs.Subject(name="slow arm")))
+    found = sessions.add(file, renamed, "2026-01-05")
+    assert all(c.dates == ("2026-01-05",) for c in found.courses)
+
+
+def test_a_date_in_the_future_is_refused(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["identify", str(slow_arm), "--history", str(tmp_path / "s.sqlite"), "--date", "2226-03-14"]) == 2
+    error = capsys.readouterr().err
+    assert "--date: found 2226-03-14, which is in the future, allowed a date up to today, " in error and error.count("\n") == 1
+    assert not (tmp_path / "s.sqlite").exists()

@@ -21,6 +21,7 @@ from armrs.tabular import Tabular
 from armrs.workflows import history
 from browser import faults_on_paper, faults_on_screens, opened
 from results import kinds
+from sessions import folder_again
 from test_cohort import population, table
 from test_docs import DOCS, ROOT, blocks
 from test_sweep import EXPERIMENT as ONE_ARM
@@ -34,7 +35,7 @@ def made(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
     experiment = next(content for _, name, content in blocks(DOCS / "files.md") if name == "EXPERIMENT.toml")
     (out / "EXPERIMENT.toml").write_text(experiment, encoding="utf-8")
     dated = ["--with", "coulomb", "--history", str(out / "history.sqlite"), "--date"]
-    assert cli.main(["identify", str(slow_arm), *dated, "2026-01-02"]) == 0
+    assert cli.main(["identify", str(folder_again(slow_arm, out / "before")), *dated, "2026-01-02"]) == 0
     (out / "one.toml").write_text(ONE_ARM, encoding="utf-8")
     (out / "SWEEP.toml").write_text(SWEEP, encoding="utf-8")
     shutil.copytree(ROOT / "examples" / "cosim", out / "cosim")

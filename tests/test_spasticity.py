@@ -13,6 +13,7 @@ import pytest
 import armrs
 import patients
 from armrs import BadInput
+from armrs.analysis.stretch_sessions import stretched_joint
 from armrs.cli import main
 from armrs.io import tomlfile
 from armrs.io.muscle_activity import onset
@@ -104,7 +105,9 @@ def test_the_verb_writes_a_page_and_keeps_a_history(tmp_path: Path, capsys: pyte
 def test_one_speed_is_refused() -> None:
     data = patients.session(Patient(), SEED)
     one = dataclasses.replace(data, trials=tuple(t for t in data.trials if t.configuration == "speed 2"))
-    with pytest.raises(BadInput, match="no joint that is stretched at several speeds"):
+    with pytest.raises(
+        BadInput, match=r"no joint that is stretched at several speeds.*armrs plan MODEL .* proposes stretches at five speeds"
+    ):
         armrs.spasticity(one)
 
 
@@ -143,3 +146,13 @@ def test_markers_at_the_axis_are_whole() -> None:
         left = clinic_figures._stretches(None, found, "elbow").figure.axes[0]  # type: ignore[arg-type]
     assert min(float(line.get_ydata()[0]) for line in left.lines) == 0.0 == left.get_ylim()[0]
     assert not any(line.get_clip_on() for line in left.lines)
+
+
+def test_a_session_of_stretches_is_told_from_others(slow_arm: Path) -> None:
+    """After `armrs record` and `armrs check` of planned stretches, the next step was `armrs gap`."""
+    stretches = patients.session(Patient(), SEED)
+    assert stretched_joint(stretches.trials) == stretches.model.n_joints
+    assert stretched_joint(stretches.trials[:3]) is None
+    assert stretched_joint(armrs.load_dataset(slow_arm).trials) is None
+    same = [t for t in stretches.trials if t.configuration == "speed 0"]
+    assert stretched_joint([*same, *same]) is None

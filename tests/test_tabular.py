@@ -29,6 +29,7 @@ from armrs.tabular import Framed, Tabular, Tidy
 from armrs.workflows import history
 from browser import opened
 from results import kinds, returned, series_faults
+from sessions import again as recorded_again
 from test_docs import DOCS, ROOT, blocks
 
 
@@ -105,7 +106,7 @@ def results(identified: armrs.Identified, run: armrs.Simulated, folder: Path) ->
     """A result of every kind but those that take long, which have tests of their own."""
     movement = armrs.Movement(np.radians([[-60, 60], [-20, 90], [-60, 60]]), speed=1.0, acceleration=4.0)
     for day in (1, 2):
-        followed = history.add(folder / "s1.sqlite", identified, f"2026-01-0{day}")
+        followed = history.add(folder / "s1.sqlite", recorded_again(identified, day), f"2026-01-0{day}")
     return {
         "parameters": identified,
         "simulated": run,
@@ -170,7 +171,7 @@ def test_a_report_is_a_page_of_html(run: armrs.Simulated, tmp_path: Path) -> Non
 
 def test_a_history_is_a_tidy_frame(identified: armrs.Identified, tmp_path: Path) -> None:
     history.add(tmp_path / "s1.sqlite", identified, "2026-01-01")
-    followed = history.add(tmp_path / "s1.sqlite", identified, "2026-02-01")
+    followed = history.add(tmp_path / "s1.sqlite", recorded_again(identified, 1), "2026-02-01")
     frame = followed.to_dataframe()
     assert set(frame["date"]) == {"2026-01-01", "2026-02-01"} and len(frame) == 2 * len(followed.courses)
     assert "nothing changed in the last session" in repr(followed)

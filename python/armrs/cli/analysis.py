@@ -37,7 +37,8 @@ def day_of(data: Dataset, history: Path | None, date: str | None) -> str:
         raise BadInput("--date", Text("no --history"), "--date beside --history FILE: the date is kept only there")
     day = sessions.session_date(data.name, date)
     if history is not None:
-        sessions.check(history, data.model.n_joints, sessions.subject_of(data))
+        sessions.refuse_future(day)
+        sessions.check(history, data.model.n_joints, sessions.subject_of(data), data, day)
     return day
 
 
@@ -50,7 +51,7 @@ def kept(history: Path | None, result: Followed, day: str, plain: dict[str, Any]
 
             followed = stack.enter_context(sessions.adding(history, result, day))
             console.warn(followed.warnings)
-            plain["history"] = followed.to_dict()["courses"]
+            plain["history"], plain["session"] = followed.to_dict()["courses"], followed.session()
         yield
 
 

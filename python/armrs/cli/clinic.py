@@ -9,7 +9,7 @@ import typer
 
 from ..report import console
 from .analysis import HistoryFile, SessionDate, day_of, kept
-from .common import JsonFile, MaybeFolder, Source, command_line, present, writable
+from .common import JsonFile, MaybeFolder, Source, command_line, present, quoted, writable
 
 
 def spasticity(
@@ -64,8 +64,9 @@ def cohort(
 ) -> int:
     """Summarise many subjects: mean, scatter between and within subjects, groups and sides compared, norm bands with their uncertainty.
 
-    A table has the columns subject, quantity, value, and optionally unit, std, group, side, date. Of data sets in a folder passive moments
-    are computed. cohort.csv below -o is the tidy table, one value a row.
+    A table has the columns subject, quantity, value, and optionally unit, std, group, side (left or right), date. Cells are between commas,
+    semicolons or tabs. Of data sets in a folder passive moments are computed. Below -o, cohort.csv is the tidy table, one value a row, and
+    norms.toml has the norm bands for armrs report --summary --norms, a file for each group.
 
     Exit status 1 when something was left out.
     """
@@ -79,5 +80,11 @@ def cohort(
     plain = cohort_data(result, command_line(context))
     written = write_cohort(result, plain, folder) if folder else []
     console.warn(list(result.warnings))
-    present(lambda: plain, json, lambda: clinic_sentences.show_cohort(plain, written))
+    norms = next((path for path in written if path.name.startswith("norms")), None)
+    step = (
+        None
+        if norms is None
+        else f"armrs report RESULT.json --summary --norms {quoted(norms)} -o clinic compares one session with these bands"
+    )
+    present(lambda: plain, json, lambda: clinic_sentences.show_cohort(plain, written), step)
     return 1 if result.warnings else 0

@@ -167,7 +167,8 @@ def report(
     if norms is not None and not summary:
         raise BadInput("--norms", Text("no --summary"), "--norms beside --summary")
     if summary:
-        from ..report.clinic_page import load_norms, write_summary
+        from ..report.clinic_norms import load_norms
+        from ..report.clinic_page import write_summary
 
         usual = () if norms is None else load_norms(norms)
         page = files.output_folder(out, "-o") / "summary.html"

@@ -225,6 +225,7 @@ def record(
     With [sensors.six_axis], the force is made of the readings of a six-axis force sensor, which are in wrench/. Exit status 1 when the
     safety supervisor stopped a trial; that trial is not in the data set.
     """
+    from ..analysis.stretch_sessions import stretched_joint
     from ..report import sentences
     from ..report.result_files import write_recorded
     from ..workflows.experiment import load_experiment
@@ -242,7 +243,10 @@ def record(
     apart = "" if any(run.tests for run in planned.runs) else "; tests = 1 in [[movement]] records a test trial, which no fit uses"
     worn = ", ".join(run.configuration for run in planned.runs if run.worn)
     alike = f"remove [[added]] and the trials of {worn} from {quoted(out / 'dataset.toml')}, then " if worn else ""
-    present(lambda: plain, json, lambda: sentences.recorded(plain, report), f"{alike}armrs gap {quoted(out)} -o gap{apart}")
+    step = f"{alike}armrs gap {quoted(out)} -o gap{apart}"
+    if stretched_joint(result.dataset.trials) is not None:
+        step = f"{alike}armrs check {quoted(out)}, then armrs spasticity {quoted(out)} -o spasticity"
+    present(lambda: plain, json, lambda: sentences.recorded(plain, report), step)
     return 1 if result.stopped else 0
 
 

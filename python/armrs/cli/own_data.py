@@ -54,6 +54,13 @@ class Elbow(str, enum.Enum):
     down = "down"
 
 
+class Arm(str, enum.Enum):
+    """Which arm of a person."""
+
+    left = "left"
+    right = "right"
+
+
 class Side(str, enum.Enum):
     """What raw forces act on."""
 
@@ -86,6 +93,7 @@ def init(
         str, typer.Option("--robot-base-m", metavar="Y,Z", help="Its base, forward and up of the first joint of the arm [m].")
     ] = "",
     robot_elbow: Annotated[Elbow, typer.Option(help="Whether its elbow is above or below the line from base to hand.")] = Elbow.up,
+    side: Annotated[Arm | None, typer.Option(help="Which arm is measured.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
     json: JsonFile = None,
 ) -> None:
@@ -104,7 +112,17 @@ def init(
         worn.append(Worn(len(measured), handle))
     robot = _robot(robot_lengths, robot_base, robot_elbow)
     writable(folder, json)
-    done = initialise(folder, body_mass=body_mass, height=height, sex=sex.value, lengths=measured, worn=worn, robot=robot, replace=force)
+    done = initialise(
+        folder,
+        body_mass=body_mass,
+        height=height,
+        sex=sex.value,
+        lengths=measured,
+        worn=worn,
+        robot=robot,
+        side=side and side.value,
+        replace=force,
+    )
 
     def human() -> None:
         print(f"Wrote {done.folder / 'model.toml'} and {done.folder / 'dataset.toml'}. Assumed:")
@@ -299,9 +317,13 @@ def _ask_columns(sources: list[Path], points: tuple[str, ...], model: Path) -> s
 
 
 def _after_check(done: Checked, dataset: Path) -> str:
+    from ..analysis.stretch_sessions import stretched_joint
+
     place = shlex.quote(str(dataset))
     if done.errors:
         return f"correct the errors above, then armrs check {place} again"
+    if done.dataset is not None and stretched_joint(done.dataset.trials) is not None:
+        return f"armrs spasticity {place} -o spasticity, then armrs passive {place} -o passive: a joint is stretched at several speeds"
     able = [
         f"armrs {v.verb} {place} -o {'identified' if v.verb == 'identify' else v.verb}"
         for v in done.verbs

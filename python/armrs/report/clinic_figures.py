@@ -12,6 +12,7 @@ import numpy as np
 from ..io import files
 from ..workflows import result_data
 from . import figures, plotting
+from .clinic_norms import norms_of
 from .figures import Drawn, Figures
 from .result_files import write_result
 from .view import View
@@ -134,12 +135,18 @@ def write_spasticity(result: Spasticity, data: dict[str, Any], folder: Path) -> 
 
 
 def write_cohort(result: Cohort, data: dict[str, Any], folder: Path) -> list[Path]:
-    """Write `cohort.json`, `cohort.csv` (tidy, one value a row), a figure and `report.html` below a folder; return the files."""
+    """Write `cohort.json`, `cohort.csv` (tidy, one value a row), `norms.toml`, a figure and `report.html` below a folder.
+
+    Returns the files. Norm bands of several groups are in a file each.
+    """
     drawn = figures.draw(cohort_figures(result))
+    norms = norms_of(result)
 
     def write(out: Path) -> list[Path]:
         result.write_table(out / "cohort.csv")
-        return [out / "cohort.csv", *write_result(out, "cohort", data, drawn)]
+        for name, text in norms.items():
+            files.write_text(out / name, text, kind=".toml")
+        return [out / "cohort.csv", *(out / name for name in norms), *write_result(out, "cohort", data, drawn)]
 
     return files.write_whole(folder, write)
 

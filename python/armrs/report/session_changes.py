@@ -1,18 +1,56 @@
-"""Changes between sessions, for the page for a clinician: size and certainty."""
+"""Differences between sessions and between arms, for the page for a clinician: size and certainty."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from ..formatting import two_digits
 
-NO_CHANGE = "no clear change"
-CLEAR = ("higher", "lower")
-"""How the words of a clear change begin."""
+NO_CHANGE, PERHAPS = "no clear change", "perhaps"
 SURE = "How sure: if nothing had changed, each analysis would still report a change in 1 of 20 sessions."
 EITHER_WAY = "The number behind ± is half of a 95 % interval."
+
+
+@dataclass(frozen=True)
+class Change:
+    """A quantity of this session less that of another one, in its unit.
+
+    Attributes
+    ----------
+    value, either_way : float
+        The difference, and half of its 95 % interval taken alone.
+    share_of : float or None
+        The other value, where a share of it means something.
+    clear : bool
+        Whether it is beyond chance over all quantities that were compared.
+    date : str
+        Of the other session.
+    compared : int
+        Quantities that were compared together.
+    own_std : float
+        Standard deviation of this session's value.
+    """
+
+    value: float
+    either_way: float
+    share_of: float | None
+    clear: bool
+    date: str
+    compared: int
+    own_std: float
+
+    @property
+    def perhaps(self) -> bool:
+        """Whether it is beyond its own interval, but not beyond chance over all quantities."""
+        return not self.clear and abs(self.value) > self.either_way
+
+    @property
+    def words(self) -> str:
+        """Describe it: by how much, both with the digits of its uncertainty, and as a share, where that means something."""
+        return trend(self.value, self.either_way, self.share_of, clear=self.clear)
 
 
 class Titled(Protocol):
@@ -28,7 +66,7 @@ class Titled(Protocol):
 
 
 class Row(Protocol):
-    """A quantity of one joint with its trend."""
+    """A quantity of one joint."""
 
     @property
     def joint(self) -> str:
@@ -39,8 +77,8 @@ class Row(Protocol):
         """What it is."""
 
     @property
-    def trend(self) -> str | None:
-        """As in `trend`."""
+    def before(self) -> Change | None:
+        """What it is compared with: the session before."""
 
 
 def trend(change: float, either_way: float, before: float | None, *, clear: bool) -> str:
@@ -48,28 +86,45 @@ def trend(change: float, either_way: float, before: float | None, *, clear: bool
     size = either_way if either_way > 0.0 and math.isfinite(either_way) else abs(change)
     decimals = two_digits(size) if size > 0.0 else 0
     width = f"{either_way:.{decimals}f}"
+    way = "higher" if change > 0.0 else "lower"
     if not clear:
-        return f"{NO_CHANGE}: {change:+.{decimals}f} ± {width}".replace("-", "−")
+        said = f"{PERHAPS} {way}" if abs(change) > either_way else NO_CHANGE
+        return f"{said}: {change:+.{decimals}f} ± {width}".replace("-", "−")
     share = f" ({change / abs(before):+.0%})".replace("%", " %").replace("-", "−") if before else ""
-    return f"{'higher' if change > 0.0 else 'lower'} by {abs(change):.{decimals}f} ± {width}{share}"
+    return f"{way} by {abs(change):.{decimals}f} ± {width}{share}"
 
 
-def change_lines(rows: Sequence[Row]) -> list[str]:
-    """Return what changed since the session before, what did not, and how sure that is; nothing without a session before."""
-    followed = [row for row in rows if row.trend is not None]
-    clear = [row for row in followed if row.trend and row.trend.startswith(CLEAR)]
-    lines = [f"{row.joint}: {row.quantity.title.lower()} is {_with_unit(row)}." for row in clear]
-    same: dict[str, list[str]] = {}
-    for row in followed:
-        if row not in clear:
-            same.setdefault(row.joint, []).append(row.quantity.title.lower())
-    if clear:
+def change_lines(
+    rows: Sequence[Row], change_of: Callable[[Row], Change | None] = lambda row: row.before, what: str = "change", than: str = ""
+) -> list[str]:
+    """Return what differs, what does not, and how sure that is; nothing without anything to compare with.
+
+    `what` is the word for a difference, `than` what it is compared with, behind `higher` and `lower`.
+    """
+    followed = [(row, change) for row in rows if (change := change_of(row)) is not None]
+    date = max((change.date for _, change in followed), default="")
+    lines = []
+    for row, change in followed:
+        if change.clear:
+            told, _, share = change.words.partition(" (")
+            way, _, rest = told.partition(" by ")
+            since = "" if change.date == date else f", compared with {change.date}"
+            lines.append(f"{_named(row)} is {way}{than} by {rest} {row.quantity.unit}{share and f' ({share}'}{since}.")
+    if lines and what == "change":
         lines.append(SURE)
+    for row, change in followed:
+        if change.perhaps:
+            told = change.words.partition(": ")[2]
+            many = f"but {change.compared} quantities were compared, and one of them may do that by chance"
+            lines.append(f"Perhaps: {_named(row)} {told} {row.quantity.unit}. This is more than its ±, {many}.")
+    same: dict[str, list[str]] = {}
+    for row, change in followed:
+        if not change.clear and not change.perhaps:
+            same.setdefault(row.joint, []).append(row.quantity.title.lower())
     unclear = "; ".join(f"{joint} ({', '.join(own)})" for joint, own in same.items())
-    lines += [f"No clear change: {unclear}."] if same else []
+    lines += [f"No clear {what}: {unclear}."] if same else []
     return [*lines, *([EITHER_WAY] if followed else [])]
 
 
-def _with_unit(row: Row) -> str:
-    told, _, share = str(row.trend).partition(" (")
-    return f"{told} {row.quantity.unit}{share and f' ({share}'}"
+def _named(row: Row) -> str:
+    return f"{row.joint}: {row.quantity.title.lower()}"

@@ -7,7 +7,7 @@ import io
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,13 @@ import numpy as np
 from .. import checks
 from ..analysis import mixed_model, students_t
 from ..analysis.mixed_model import MixedModel
-from ..errors import ArmrsError, BadInput, Text
-from ..io import files, jsonfile
-from ..io.tomlfile import read_text
+from ..errors import ArmrsError, BadInput, Text, show, unreadable
+from ..io import arm_side, files, jsonfile
+from ..io.raw import text_table
 from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
-from .history import holm, session_date, without_date
+from .courses import holm
+from .history import session_date, without_date
 from .passive import passive_moments
 from .result_data import passive_data
 
@@ -191,7 +192,8 @@ def cohort(
     Parameters
     ----------
     source : path
-        A CSV with a value a row: subject, quantity, value, and optionally unit, std, group, side, date. Or a folder, searched at all
+        A CSV with a value a row: subject, quantity, value, and optionally unit, std, group, side (left or right), date; with commas,
+        semicolons or tabs between cells, decimal points or commas. Or a folder, searched at all
         depths: JSON results of `identify`, `passive`, `gap` and `spasticity`; where there are none, data sets, whose passive moments
         are computed.
     groups : path, optional
@@ -247,6 +249,8 @@ def _summary(values: Sequence[Value]) -> tuple[list[Quantity], list[Contrast], l
     groups = [g for g in counts if g not in few]
     if not groups:
         return [], [], warnings
+    if len({v.side for v in kept if v.side}) > 1 and (without := sum(not v.side for v in kept)):
+        warnings.append(f"{name}: {without} of {len(kept)} values state no side: sides are not compared")
     cells = _cells(kept, groups)
     kept = [v for own in cells.values() for v in own]
     design = np.repeat(np.eye(len(cells)), [len(own) for own in cells.values()], axis=0)
@@ -319,56 +323,100 @@ def _contrast(
 
 
 def _rows(path: Path, needed: Sequence[str], may: Sequence[str]) -> list[tuple[int, Mapping[str, str]]]:
-    """Return the rows of a CSV with their numbers in the file."""
-    table = csv.DictReader(read_text(path, "a table in CSV").splitlines())
-    head = [name.strip() for name in table.fieldnames or ()]
+    """Return the rows of a text table with their numbers in the file, blank ones not counted."""
+    try:
+        lines, _ = text_table.decoded_lines(path)
+    except OSError as error:
+        raise unreadable(error, "a table in CSV", file=path) from None
+    except BadInput as error:
+        raise error.within(file=path) from None
+    head, *body = text_table.rows_of(lines) if lines else [[]]
+    head = [name.lower() for name in head]
+    while head and not head[-1]:  # a spreadsheet writes empty columns
+        head.pop()
     missing = [name for name in needed if name not in head]
     unknown = [name for name in head if name not in (*needed, *may)]
     if missing or unknown:
         raise BadInput(
             "columns", Text(", ".join(head) or "none"), f"{', '.join(needed)}, and may be {', '.join(may) or 'no more'}", file=path
         )
-    table.fieldnames = head
-    rows: list[tuple[int, Mapping[str, str]]] = [
-        (number, {k: (v or "").strip() for k, v in row.items() if k is not None}) for number, row in enumerate(table, start=2)
-    ]
+    rows: list[tuple[int, Mapping[str, str]]] = []
+    for number, cells in enumerate(body, start=2):
+        if any(cells[len(head) :]):
+            hint = "a decimal comma? Put semicolons between the cells"
+            raise BadInput(f"row {number}", Text(f"{len(cells)} cells"), f"{len(head)}, as the first row", file=path, hint=hint)
+        if any(cells):
+            rows.append((number, dict.fromkeys(head, "") | dict(zip(head, cells, strict=False))))
     if not rows:
         raise BadInput("rows", Text("none"), "a value a row", file=path)
     return rows
 
 
 def _of_table(path: Path) -> list[Value]:
-    values = []
-    for number, row in _rows(path, NEEDED, MAY):
-        value = _number(row, "value", number, path)
-        std = _number(row, "std", number, path) if row.get("std") else None
+    rows, values = _rows(path, NEEDED, MAY), []
+    decimal = text_table.decimal_of([row.get(name, "") for _, row in rows for name in ("value", "std")])
+    for number, row in rows:
+        value = _number(row, "value", (number, path, decimal))
+        std = _number(row, "std", (number, path, decimal)) if row.get("std") else None
         for name in ("subject", "quantity"):
             if not row[name]:
                 raise BadInput(f"row {number}, {name}", Text("nothing"), "a name", file=path)
         words = {name: row.get(name, "") for name in COLUMNS if name not in ("value", "std")}
-        values.append(Value(value=value, std=std, **words))
+        values.append(Value(value=value, std=std, **words | {"side": _side(row, number, path)}))
     return values
 
 
-def _number(row: Mapping[str, str], name: str, number: int, path: Path) -> float:
-    try:
-        found = float(row[name])
-    except ValueError:
-        found = np.nan
-    if not abs(found) < _MOST:
-        raise BadInput(f"row {number}, {name}", row[name], f"a number below {_MOST:g}", file=path)
+def _number(row: Mapping[str, str], name: str, where: tuple[int, Path, str]) -> float:
+    number, path, decimal = where
+    found = text_table.number_in(row[name], decimal)
+    if found is None or not abs(found) < _MOST:
+        marked = " with a decimal comma, as other rows have" if decimal == "," else ""
+        raise BadInput(f"row {number}, {name}", row[name], f"a number below {_MOST:g}{marked}", file=path)
     return found
 
 
-def _groups(path: str | os.PathLike[str] | None) -> Mapping[str, tuple[str, str]]:
-    """Return group and side by the name of a subject or of a data set."""
+def _side(row: Mapping[str, str], number: int, path: Path) -> str:
+    """Return the side of a row, `left` or `right`; empty where it states none."""
+    word = row.get("side", "")
+    side = arm_side.written_side(word)
+    if word and side is None:
+        allowed = f"{' or '.join(' '.join(words) for words in arm_side.WORDS.values())} in any case, or nothing"
+        raise BadInput(f"row {number}, side", word, allowed, file=path, hint="affected or not belongs into the column group")
+    return side or ""
+
+
+@dataclass(frozen=True)
+class _Groups:
+    """Group and side by the name of a subject or of a data set, and where they are stated."""
+
+    path: Path | None = None
+    rows: Mapping[str, tuple[int, str, str]] = field(default_factory=dict)
+
+    def of(self, name: str, subject: str) -> tuple[str, str]:
+        """Return group and side of a data set."""
+        _, group, side = self.rows.get(name, self.rows.get(subject, (0, "", "")))
+        return group, side
+
+    def unused(self, names: Set[str]) -> list[str]:
+        """Return which rows are of nobody."""
+        shown = ", ".join(sorted(names))
+        return [
+            f"{self.path}: row {number}, subject: found {show(name)}, allowed {shown}: it is in no result"
+            for name, (number, *_) in self.rows.items()
+            if name not in names
+        ]
+
+
+def _groups(path: str | os.PathLike[str] | None) -> _Groups:
+    """Read group and side by the name of a subject or of a data set."""
     if path is None:
-        return {}
+        return _Groups()
     file = checks.path("groups", path)
-    return {row["subject"]: (row.get("group", ""), row.get("side", "")) for _, row in _rows(file, ["subject"], ["group", "side"])}
+    rows = _rows(file, ["subject"], ["group", "side"])
+    return _Groups(file, {row["subject"]: (number, row.get("group", ""), _side(row, number, file)) for number, row in rows})
 
 
-def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]], tell: Callable[[str, float], None]) -> tuple[list[Value], list[str]]:
+def _of_folder(folder: Path, groups: _Groups, tell: Callable[[str, float], None]) -> tuple[list[Value], list[str]]:
     """Return the values of all results in a folder, or of its data sets where there are none."""
     results: list[dict[str, Any]] = []
     warnings: list[str] = []
@@ -385,8 +433,12 @@ def _of_folder(folder: Path, groups: Mapping[str, tuple[str, str]], tell: Callab
         raise BadInput(
             "source", Text("a folder without results and data sets"), "JSON of armrs identify, passive, gap or spasticity", file=folder
         )
-    values = [v for data in results for v in _of_result(data, groups)]
-    return values, warnings
+    try:
+        values = [v for data in results for v in _of_result(data, groups)]
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise BadInput("content", Text(f"not what a result holds ({error})"), "whole results", file=folder) from None
+    named = {name for data in results for name in _names(data)}
+    return values, [*warnings, *groups.unused(named)]
 
 
 def _computed(folder: Path, tell: Callable[[str, float], None]) -> tuple[list[dict[str, Any]], list[str]]:
@@ -408,11 +460,18 @@ def _passive(dataset: Path) -> dict[str, Any] | str:
     return plain
 
 
-def _of_result(data: Mapping[str, Any], groups: Mapping[str, tuple[str, str]]) -> list[Value]:
-    """Return the values of the subject in one result."""
+def _names(data: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the names of the data set and of the subject of a result."""
     name = str(data["data"]["name"])
-    subject = str(data["data"].get("subject") or without_date(name) or name)
-    group, side = groups.get(name, groups.get(subject, ("", "")))
+    return name, str(data["data"].get("subject") or without_date(name) or name)
+
+
+def _of_result(data: Mapping[str, Any], groups: _Groups) -> list[Value]:
+    """Return the values of the subject in one result."""
+    name, subject = _names(data)
+    group, side = groups.of(name, subject)
+    side = side or data["data"].get("side") or ""
+    date = data.get("session", {}).get("date") or session_date(name)
     if data["verb"] == "identify":
         found = [(e["kind"], e["name"], e["joint"], e) for e in data["parameters"] if e["decided_by"] == "data"]
     elif data["verb"] == "passive":
@@ -425,5 +484,5 @@ def _of_result(data: Mapping[str, Any], groups: Mapping[str, tuple[str, str]]) -
     for kind, what, joint, entry in found:
         if entry["value"] is not None and np.isfinite(entry["value"]):
             label = f"{kind} {what}" + ("" if joint is None else f" of joint {joint}")
-            values.append(Value(subject, label, float(entry["value"]), entry["unit"], entry.get("std"), group, side, session_date(name)))
+            values.append(Value(subject, label, float(entry["value"]), entry["unit"], entry.get("std"), group, side, date))
     return values

@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 import datetime
+import hashlib
 import os
 import re
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text, show
-from ..formatting import parameter_label
 from ..io import files
 from ..io.dataset import Dataset
-from ..tabular import Tabular, Tidy
+from .courses import History, history_of
 from .identify import Estimate
 
 APPLICATION = 0x61726D73
 """Mark of our files: "arms" in ASCII."""
-_TOGETHER = ("joint", "cascade")
-"""Methods that estimate all parameters of a joint together."""
-LEVEL = 0.95
-"""One minus the probability of calling any parameter changed when none is."""
 LONGEST_WAIT = 60.0
 """Time for which a history that another process writes is waited for [s]; writing takes some milliseconds."""
 _SCHEMA = """
@@ -44,6 +40,11 @@ CREATE TABLE IF NOT EXISTS estimate (
 """
 _WHOSE = "CREATE TABLE IF NOT EXISTS subject (name TEXT NOT NULL);"
 """Beside it; histories of older versions have no such table."""
+_ARM = (
+    "CREATE TABLE IF NOT EXISTS arm (session INTEGER PRIMARY KEY REFERENCES session (id) ON DELETE CASCADE, "
+    "side TEXT NOT NULL, recording_sha256 TEXT NOT NULL);"
+)
+"""The same: which arm was measured, empty where that is not stated, and what was recorded."""
 _MAGIC = b"SQLite format 3\0"
 _TABLES = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
 _IMPOSSIBLE = {
@@ -59,6 +60,7 @@ _IMPOSSIBLE_SUBJECT = {
     "there are two subjects": "SELECT count(*) > 1 FROM subject",
     "a subject has no name": "SELECT count(*) FROM subject WHERE typeof(name) != 'text' OR name = ''",
 }
+_IMPOSSIBLE_ARM = {"a side is none": "SELECT count(*) FROM arm WHERE side NOT IN ('', 'left', 'right')"}
 _OUTPUTS = (".json", ".toml", ".html", ".png", ".csv", ".parquet")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 _UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
@@ -84,114 +86,6 @@ class Followed(Protocol):
 
     def followed(self) -> Sequence[Estimate]:
         """Return what is kept, each name once a joint."""
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """One parameter over sessions that measured it.
-
-    Attributes
-    ----------
-    name, kind : str
-    joint : int or None
-        From 1; None where it belongs to no single joint.
-    unit : str
-    dates : tuple of str
-        ISO dates, in order.
-    values, stds : ndarray, shape (n_sessions,)
-        A deviation is the wider half of the interval, in normal quantiles: few trials, whose scatter is uncertain, count as few.
-    change, change_std : float
-        The last value less the mean of those before, weighted by certainty; NaN where there is none to compare with. Sessions compare
-        when the data decided the same parameters of that joint: where another one sat at a bound, a deviation means less.
-    p_value : float
-        Of so large a change by chance, over all parameters followed (Holm 1979); NaN for a single session.
-    since_last, since_last_std, since_last_p_value : float
-        The last value less that of the session before it, its deviation, and the probability over all parameters; NaN as above.
-    """
-
-    name: str
-    kind: str
-    joint: int | None
-    unit: str
-    dates: tuple[str, ...]
-    values: np.ndarray
-    stds: np.ndarray
-    change: float
-    change_std: float
-    p_value: float
-    since_last: float
-    since_last_std: float
-    since_last_p_value: float
-
-    @property
-    def changed_since_last(self) -> bool:
-        """Whether the last session differs from the one before it."""
-        return self.since_last_p_value < 1.0 - LEVEL
-
-    @property
-    def changed(self) -> bool:
-        """Whether the last session differs from those before."""
-        return self.p_value < 1.0 - LEVEL
-
-    @property
-    def label(self) -> str:
-        """Name for people."""
-        return parameter_label({"name": self.name, "kind": self.kind, "joint": self.joint})
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "joint": self.joint,
-            "unit": self.unit,
-            "dates": list(self.dates),
-            "values": self.values,
-            "stds": self.stds,
-            "change": self.change,
-            "change_std": self.change_std,
-            "p_value": self.p_value,
-            "changed": self.changed,
-            "since_last": self.since_last,
-            "since_last_std": self.since_last_std,
-            "since_last_p_value": self.since_last_p_value,
-            "changed_since_last": self.changed_since_last,
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class History(Tabular):
-    """What is known of one subject over sessions.
-
-    Attributes
-    ----------
-    subject : str or None
-    courses : tuple of Course
-        One for every parameter that the data decided in the last session.
-    warnings : tuple of str
-        What the file holds that cannot be compared.
-    """
-
-    subject: str | None
-    courses: tuple[Course, ...]
-    warnings: tuple[str, ...] = ()
-
-    def __repr__(self) -> str:
-        changed = [c.label for c in self.courses if c.changed]
-        dates = len({date for c in self.courses for date in c.dates})
-        said = f"changed in the last session: {', '.join(changed)}" if changed else "nothing changed in the last session"
-        return f"History({self.subject!r}: {len(self.courses)} parameters on {dates} dates; {said})"
-
-    def tidy(self) -> Tidy:
-        """Return the values, one parameter and session a row."""
-        rows = [(c, k) for c in self.courses for k in range(len(c.dates))]
-        columns: dict[str, list[Any]] = {name: [getattr(c, name) for c, _ in rows] for name in ("name", "kind", "joint", "unit")}
-        columns |= {"date": [c.dates[k] for c, k in rows]}
-        return Tidy(columns | {name: [float(getattr(c, f"{name}s")[k]) for c, k in rows] for name in ("value", "std")}, {})
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {"subject": self.subject, "courses": [course.to_dict() for course in self.courses]}
 
 
 def session_date(name: str, given: str | None = None) -> str:
@@ -234,8 +128,16 @@ def without_date(name: str) -> str:
     return _DATE.sub("", name).strip(_AROUND)
 
 
-def check(path: str | os.PathLike[str], joints: int, subject: str) -> None:
-    """Refuse a history file that cannot be added to, before any work is done."""
+def refuse_future(date: str) -> None:
+    """Refuse the date of a session that has not been yet."""
+    # Somewhere it is tomorrow already.
+    today = datetime.date.today()
+    if datetime.date.fromisoformat(date) > today + datetime.timedelta(days=1):
+        raise BadInput("date", Text(f"{date}, which is in the future"), f"a date up to today, {today.isoformat()}")
+
+
+def check(path: str | os.PathLike[str], joints: int, subject: str, dataset: Dataset | None = None, date: str | None = None) -> None:
+    """Refuse a history file that cannot be added to, before any work is done; with a data set and its date also a second copy of it."""
     file = checks.path("history", path)
     files.must_be_writable(file)
     if file.is_dir():
@@ -246,6 +148,8 @@ def check(path: str | os.PathLike[str], joints: int, subject: str) -> None:
     if file.exists():
         with _reading(file) as connection:
             _same_arm(connection, joints, subject, file)
+            if dataset is not None and date is not None:
+                _refuse_copy(connection, dataset, date, file)
 
 
 def add(path: str | os.PathLike[str], result: Followed, date: str) -> History:
@@ -263,24 +167,24 @@ def adding(path: str | os.PathLike[str], result: Followed, date: str) -> Iterato
     path : path
         File of SQLite, made when it does not exist; one subject a file.
     result : Followed
-        Of `identify`, `find_gap`, `passive_moments` or `spasticity`. The same session (name of the data set, date, method) takes the
-        place of its former result.
+        Of `identify`, `find_gap`, `passive_moments` or `spasticity`. The same session (name of the data set, side, date, method), and
+        another result of the same recording on that date, take the place of the former result.
     date : str
         ISO date of the session.
 
     Raises
     ------
     BadInput
-        For a file of another kind, of another arm or of another subject.
+        For a file of another kind, of another subject or an arm of other joints, and a recording that is there with another date or side.
     """
     file, subject = Path(path), subject_of(result.dataset)
-    check(file, result.dataset.model.n_joints, subject)
+    check(file, result.dataset.model.n_joints, subject, result.dataset, date)
     try:
         yield _foreseen(file, result, subject, date)
         # The file is written only now, in one short transaction: the block may take long, and others may add meanwhile.
         file.parent.mkdir(parents=True, exist_ok=True)
         with closing(_open(file)) as connection:
-            _write(connection, result, subject, date)
+            _write(connection, result, subject, date, file)
     except sqlite3.Error as error:
         raise BadInput("history", Text(str(error)), "a history that can be written", file=file) from None
 
@@ -292,43 +196,78 @@ def _foreseen(file: Path, result: Followed, subject: str, date: str) -> History:
         if file.exists() and file.stat().st_size > 0:
             with closing(_open(file)) as connection:
                 connection.backup(memory)
-        replaced = _write(memory, result, subject, date)
-        found = _courses(memory, result.method)
-        if not _estimates(result):
+        session, replaced = _write(memory, result, subject, date, file)
+        if session is None:
             line = f"history: no quantity of {show(result.dataset.name)} on {date} has an interval (no repeats?): it is not added"
-            return replace(found, warnings=(*found.warnings, line))
+            return History(subject, (), (line,), date, result.dataset.side)
+        found = history_of(memory, result.method, _whose(memory), session)
         if not replaced:
             return found
         line = f"history: the former result of {show(result.dataset.name)} on {date} is replaced; another --date keeps both"
         return replace(found, warnings=(*found.warnings, line))
 
 
-def _write(connection: sqlite3.Connection, result: Followed, subject: str, date: str) -> bool:
+def _write(connection: sqlite3.Connection, result: Followed, subject: str, date: str, file: Path) -> tuple[int | None, bool]:
     """Add a result in one transaction, the tables included: a process that is killed leaves the history as it was.
 
     Returns
     -------
+    int or None
+        Number of the session; None for a result without intervals, which is not added.
     bool
         Whether it took the place of a former one.
     """
     # A script begins its own transaction; statements that follow it belong to the same one.
-    connection.executescript(f"BEGIN IMMEDIATE; PRAGMA application_id = {APPLICATION}; {_SCHEMA} {_WHOSE}")
+    connection.executescript(f"BEGIN IMMEDIATE; PRAGMA application_id = {APPLICATION}; {_SCHEMA} {_WHOSE} {_ARM}")
+    _refuse_copy(connection, result.dataset, date, file)
     connection.execute("INSERT INTO subject SELECT ? WHERE NOT EXISTS (SELECT * FROM subject)", (subject,))
-    replaced = _insert(connection, result, date)
+    added = _insert(connection, result, date)
     connection.commit()
-    return replaced
+    return added
 
 
-def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> bool:
+def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> tuple[int | None, bool]:
     estimates = _estimates(result)
     if not estimates:
-        return False
-    key = (result.dataset.name, date, result.method)
-    former = connection.execute("DELETE FROM session WHERE name = ? AND date = ? AND method = ?", key)
-    made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", (*key, result.dataset.model.n_joints))
-    rows = [(made.lastrowid, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items()]
+        return None, False
+    data, recorded = result.dataset, _recorded(result.dataset)
+    name = data.name if data.side is None else f"{data.name} ({data.side} arm)"
+    # A former result may have been stored before its side was stated, or its data set named otherwise.
+    former = connection.execute(
+        "DELETE FROM session WHERE date = ? AND method = ? AND (name IN (?, ?) OR id IN "
+        "(SELECT session FROM arm WHERE recording_sha256 = ?))",
+        (date, result.method, name, data.name, recorded),
+    )
+    key = (name, date, result.method, data.model.n_joints)
+    made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", key).lastrowid
+    connection.execute("INSERT INTO arm VALUES (?, ?, ?)", (made, data.side or "", recorded))
+    rows = [(made, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items()]
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
-    return former.rowcount > 0
+    return made, former.rowcount > 0
+
+
+def _recorded(dataset: Dataset) -> str:
+    """Return a digest of the samples of a session: the same for a copy under other names, in another order or another format."""
+    digests = []
+    for trial in dataset.trials:
+        channels = (trial.t, trial.q, trial.force_on_arm, trial.tau, trial.robot_q)
+        digests.append(hashlib.sha256(b"".join(np.ascontiguousarray(c).tobytes() for c in channels if c is not None)).hexdigest())
+    return hashlib.sha256("".join(sorted(digests)).encode()).hexdigest()
+
+
+def _refuse_copy(connection: sqlite3.Connection, dataset: Dataset, date: str, file: Path) -> None:
+    """Refuse a recording that the history has with another date or of the other arm: one session would count as two."""
+    rows = connection.execute(
+        "SELECT s.name, s.date, a.side FROM session s JOIN arm a ON a.session = s.id WHERE a.recording_sha256 = ? ORDER BY s.date, s.id",
+        (_recorded(dataset),),
+    )
+    for name, there, side in rows:
+        arm = f" of the {side} arm" if side else ""
+        if there != date or (side and dataset.side and side != dataset.side):
+            found = Text(f"the recording that it has as {show(name)} on {there}{arm}, sample for sample")
+            own = f" of the {dataset.side} arm" if dataset.side else ""
+            allowed = f"another recording for the session on {date}{own}"
+            raise BadInput("history", found, allowed, file=file, hint=f"--date {there} replaces that result")
 
 
 def _estimates(result: Followed) -> dict[tuple[str, str, int], Estimate]:
@@ -339,71 +278,20 @@ def _estimates(result: Followed) -> dict[tuple[str, str, int], Estimate]:
 def read(path: str | os.PathLike[str], method: str = "joint") -> History:
     """Return every parameter that the data decided in the last session, over all sessions in which they did."""
     with _reading(checks.path("history", path)) as connection:
-        return _courses(connection, method)
+        return history_of(connection, method, _whose(connection))
 
 
 @contextmanager
 def _reading(file: Path) -> Iterator[sqlite3.Connection]:
-    """Open a history to read it; what SQLite cannot read of it is a refusal too."""
+    """Give a copy of a history in memory, with the tables that an older version did not make; what SQLite cannot read is refused."""
     try:
-        with closing(_open(file)) as connection:
-            yield connection
+        with closing(sqlite3.connect(":memory:")) as memory:
+            with closing(_open(file)) as connection:
+                connection.backup(memory)
+            memory.executescript(f"{_SCHEMA} {_WHOSE} {_ARM}")
+            yield memory
     except _UNREADABLE as error:
         raise _no_history(file, str(error)) from None
-
-
-def _courses(connection: sqlite3.Connection, method: str) -> History:
-    rows = connection.execute(
-        "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id FROM estimate e JOIN session s ON s.id = e.session "
-        "WHERE s.method = ? AND e.decided_by = 'data' ORDER BY s.date, s.id, e.rowid",
-        (method,),
-    ).fetchall()
-    by_parameter: dict[_Key, list[_Point]] = {}
-    beside: dict[tuple[int, int], set[tuple[str, str]]] = {}
-    for name, kind, joint, unit, date, value, std, session in rows:
-        by_parameter.setdefault((name, kind, joint, unit), []).append((date, value, std, session))
-        beside.setdefault((session, joint), set()).add((name, kind))
-    last = rows[-1][7] if rows else 0
-    followed = {key: points for key, points in by_parameter.items() if points[-1][3] == last}
-    # Where another parameter of the joint sat at a bound, a deviation of `identify` means less; the others estimate each by itself.
-    alike = [
-        [p for p in points if method not in _TOGETHER or beside[p[3], key[2]] == beside[last, key[2]]] for key, points in followed.items()
-    ]
-    tests, lasts = [_change(points) for points in alike], [_change(points[-2:]) for points in alike]
-    adjusted, adjusted_last = (holm([p for *_, p in all_tests]) for all_tests in (tests, lasts))
-    courses = tuple(
-        Course(
-            name=name,
-            kind=kind,
-            joint=joint or None,
-            unit=unit,
-            dates=tuple(p[0] for p in points),
-            values=np.array([p[1] for p in points]),
-            stds=np.array([p[2] for p in points]),
-            change=change,
-            change_std=std,
-            p_value=p_value,
-            since_last=since[0],
-            since_last_std=since[1],
-            since_last_p_value=p_last,
-        )
-        for ((name, kind, joint, unit), points), (change, std, _), p_value, since, p_last in zip(
-            followed.items(), tests, adjusted, lasts, adjusted_last, strict=True
-        )
-    )
-    return History(_whose(connection), courses, _in_other_units(by_parameter, followed))
-
-
-def _in_other_units(known: Mapping[_Key, Sequence[_Point]], followed: Iterable[_Key]) -> tuple[str, ...]:
-    """Return which sessions are left out, since their unit is not that of the last session; armrs writes each parameter in one."""
-    lines = []
-    for name, kind, joint, unit in followed:
-        for other, points in known.items():
-            if other[:3] == (name, kind, joint) and other[3] != unit:
-                of = f"{kind} {name}{f' of joint {joint}' if joint else ''}"
-                dates = ", ".join(date for date, *_ in points)
-                lines.append(f"history, {of}: found {show(other[3])} on {dates}, allowed {show(unit)} as in the last session: not compared")
-    return tuple(lines)
 
 
 def _open(file: Path) -> sqlite3.Connection:
@@ -443,13 +331,16 @@ def _wrong(connection: sqlite3.Connection) -> str | None:
     with closing(sqlite3.connect(":memory:")) as ours:
         ours.executescript(_SCHEMA)
         older = ours.execute(_TABLES).fetchall()
-        ours.executescript(_WHOSE)
-        if tables not in (older, ours.execute(_TABLES).fetchall()):
+        known = [older]
+        for later in (_WHOSE, _ARM):
+            ours.executescript(later)
+            known.append(ours.execute(_TABLES).fetchall())
+        if tables not in known:
             return "a history with other tables than armrs makes"
     damage = connection.execute("PRAGMA integrity_check(1)").fetchone()[0]
     if damage != "ok":
         return f"a damaged history ({damage})"
-    impossible = _IMPOSSIBLE if tables == older else _IMPOSSIBLE | _IMPOSSIBLE_SUBJECT
+    impossible = _IMPOSSIBLE | (_IMPOSSIBLE_SUBJECT if tables != older else {}) | (_IMPOSSIBLE_ARM if tables == known[-1] else {})
     return next((f"a history in which {what}" for what, query in impossible.items() if connection.execute(query).fetchone()[0]), None)
 
 
@@ -458,8 +349,6 @@ def _no_history(file: Path, found: str) -> BadInput:
 
 
 def _same_arm(connection: sqlite3.Connection, joints: int, subject: str, file: Path) -> None:
-    if not connection.execute(_TABLES).fetchall():
-        return
     whose = _whose(connection)
     if whose not in (None, subject):
         hint = "[subject] name in dataset.toml says whose arm it is, whatever the data set is called"
@@ -490,33 +379,3 @@ def _deviation(estimate: Estimate, level: float) -> float:
 
 def _usable(estimate: Estimate) -> bool:
     return bool(np.isfinite([estimate.value, *estimate.interval]).all())
-
-
-_Point = tuple[str, float, float, int]
-"""Date, value, standard deviation, session."""
-_Key = tuple[str, str, int, str]
-"""Name, kind, joint (0 for none) and unit of a parameter."""
-
-
-def _change(points: Sequence[_Point]) -> tuple[float, float, float]:
-    """Return the last value less the weighted mean of those before, its deviation, and the two-sided probability."""
-    from scipy.stats import norm
-
-    if len(points) < 2:
-        return (np.nan, np.nan, np.nan)
-    values, stds = np.array([p[1] for p in points]), np.array([max(p[2], 1e-300) for p in points])
-    weights = (stds[:-1].min() / stds[:-1]) ** 2
-    mean = float(np.sum(weights * values[:-1]) / np.sum(weights))
-    mean_std = float(stds[:-1].min() / np.sqrt(np.sum(weights)))
-    change, std = float(values[-1]) - mean, float(np.hypot(stds[-1], mean_std))
-    return change, std, float(2.0 * norm.sf(abs(change) / std))
-
-
-def holm(p_values: Sequence[float]) -> list[float]:
-    """Return probabilities over all tests together (Holm 1979); NaN stays."""
-    order = [int(k) for k in np.argsort(p_values) if np.isfinite(p_values[k])]
-    adjusted, largest = [float("nan")] * len(p_values), 0.0
-    for place, k in enumerate(order):
-        largest = max(largest, min(1.0, (len(order) - place) * p_values[k]))
-        adjusted[k] = largest
-    return adjusted

@@ -11,7 +11,7 @@ from typing import Any
 from .. import checks
 from ..anthropometry import SEGMENTS, UNCERTAINTY, check_lengths, literature_model
 from ..errors import BadInput, Text
-from ..io import files
+from ..io import arm_side, files
 from ..model import Model, Robot, Segment, Subject
 from ..tabular import Framed, Tidy
 
@@ -86,6 +86,7 @@ def initialise(
     lengths: Sequence[float | None] = (None, None, None),
     worn: Sequence[Worn] = (),
     robot: Robot | None = None,
+    side: str | None = None,
     replace: bool = False,
 ) -> Initialised:
     """Write a commented `dataset.toml` and `model.toml` of a person whose arm is not known yet.
@@ -100,6 +101,8 @@ def initialise(
         Handle and parts of an orthosis; they become part of their segments.
     robot : Robot, optional
         The robot that leads the hand. Without it `armrs import` estimates it from the recorded angles of a robot.
+    side : {"left", "right"}, optional
+        Which arm is measured.
     replace : bool
         Whether existing files may be replaced.
 
@@ -119,6 +122,7 @@ def initialise(
     """
     target = files.output_folder(folder)
     checks.flag("replace", replace)
+    side = arm_side.side_of("side", side)
     check_lengths(lengths)
     worn = checks.instances("worn", worn, Worn)
     if robot is not None:
@@ -134,7 +138,7 @@ def initialise(
 
     def write(part: Path) -> list[Path]:
         files.write_text(part / "model.toml", _model_text(model, assumed), kind=".toml")
-        files.write_text(part / "dataset.toml", _dataset_text(target, body_mass, height, sex), kind=".toml")
+        files.write_text(part / "dataset.toml", _dataset_text(target, body_mass, height, sex, side), kind=".toml")
         return [part / "model.toml", part / "dataset.toml"]
 
     files.write_whole(target, write)
@@ -174,7 +178,8 @@ def _model_text(model: Model, assumed: Sequence[str]) -> str:
     return head + model.to_toml() + tail
 
 
-def _dataset_text(folder: Path, body_mass: float, height: float, sex: str) -> str:
+def _dataset_text(folder: Path, body_mass: float, height: float, sex: str, side: str | None) -> str:
+    which = '# side = "left"' if side is None else f'side = "{side}"'
     return f"""# A data set: one folder, one model, one file for each trial. `armrs check` says what is missing or wrong.
 name = "{folder.resolve().name}"
 model = "model.toml"
@@ -185,6 +190,7 @@ force_on = "robot"              # what the recorded force acts on: "robot" (the 
 body_mass = {body_mass!r}
 height = {height!r}
 sex = "{sex}"
+{which:32}# which arm: "left" or "right"; a history compares sessions of one arm
 
 # What the calibration promises, each as one standard deviation; the values shown are the defaults.
 # [tolerance]

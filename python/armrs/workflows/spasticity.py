@@ -236,7 +236,8 @@ def spasticity(
         warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
     if not found:
         need = f"{stretch_reflex.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
-        raise BadInput("trials", Text("no joint that is stretched at several speeds"), need)
+        hint = "armrs plan MODEL --angles-deg … --spasticity JOINT -o plan proposes stretches at five speeds: record the slow ones as well"
+        raise BadInput("trials", Text("no joint that is stretched at several speeds"), need, hint=hint)
     return Spasticity(tuple(found), cutoff, tuple(warnings), given)
 
 

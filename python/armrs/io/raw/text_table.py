@@ -7,6 +7,7 @@ import csv as csv_cells
 import io
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -137,6 +138,38 @@ def split(line: str, separator: str) -> list[str]:
     if '"' in line:
         return [cell.strip() for cell in next(csv_cells.reader([line], delimiter=separator))]
     return [cell.strip().strip('"').strip() for cell in line.split(separator)]
+
+
+def rows_of(lines: list[str]) -> list[list[str]]:
+    """Return the cells of a table of words and numbers below a row of names, from the lines of `decoded_lines`.
+
+    The separator is the one that makes most cells of the names.
+
+    >>> rows_of(["subject;value", "a;0,5"])
+    [['subject', 'value'], ['a', '0,5']]
+    """
+    separator = max((s for s in _SEPARATORS if s != " "), key=lambda s: (len(split(lines[0], s)), s == ","))
+    return [split(line, separator) for line in lines]
+
+
+def decimal_of(cells: Sequence[str]) -> str:
+    """Return the decimal mark of cells with numbers: a comma where one of them can be read in no other way.
+
+    >>> decimal_of(["1", "0,25"]), decimal_of(["1", "0.25"]), decimal_of(["1.234,5"])
+    (',', '.', ',')
+    """
+    return "," if any(_is_number(cell, ",") and not _is_number(cell, ".") for cell in cells) else "."
+
+
+def number_in(cell: str, decimal: str) -> float | None:
+    """Return the number in a cell with a decimal mark, None where there is none.
+
+    >>> number_in("1.234,5", ","), number_in("0,5", "."), number_in("0.5", ",")
+    (1234.5, None, None)
+    """
+    if not _is_number(cell, decimal):
+        return number(cell) if decimal == "." else None
+    return float(cell.replace("." if decimal == "," else ",", "").replace(decimal, "."))
 
 
 def _is_number(cell: str, decimal: str) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ... import checks
 from ...errors import BadInput, BadInputs, Sentence, Text, unknown_name
-from ...io import files
+from ...io import arm_side, files
 from ...io.dataset import load_dataset
 from ...io.raw import RawTable
 from ...io.raw.units import unit
@@ -34,6 +34,9 @@ _READ, _DECIDED = 0.5, 0.9
 """Shares of the work after which recordings are read, and after which conventions are decided."""
 _NAMED = 8
 """Columns that a line names at most."""
+_About = tuple[Subject, str | None, Tolerance]
+"""What a data set says besides its recordings: whose arm, which one, and how well the devices are calibrated."""
+_NOBODY: _About = (Subject(), None, Tolerance())
 
 
 @dataclass(frozen=True)
@@ -143,10 +146,10 @@ def import_recordings(
     former = _former(files.output_folder(out), checks.flag("replace", replace))
     tell = checks.progress(progress)
     if isinstance(model, Model):
-        loaded, about = model, (Subject(), Tolerance())
+        loaded, about = model, _NOBODY
     else:
         file = model_file(paths, model)
-        loaded, about = load_model(file), _about(file)
+        loaded, about = load_model(file), _about_of(file)
     if _is_recipe(paths):
         recipe = load_recipe(paths[0])
         reads = _reread(recipe, paths[0].parent)
@@ -173,14 +176,14 @@ def model_file(sources: Sequence[str | os.PathLike[str]], model: str | os.PathLi
     return paths[0].parent / "model.toml" if model is None else checks.path("model", model, Model)
 
 
-def _about(model: Path) -> tuple[Subject, Tolerance]:
-    """Return `[subject]` and `[tolerance]` of the data set that a model lies in, as `armrs init` writes it."""
+def _about_of(model: Path) -> _About:
+    """Return `[subject]`, the side of the arm and `[tolerance]` of the data set that a model lies in, as `armrs init` writes it."""
     path = model.parent / "dataset.toml"
     if not path.is_file():
-        return Subject(), Tolerance()
-    found = Description.load(path)
+        return _NOBODY
+    found, side = arm_side.read(path)
     mine = found.model is not None and (path.parent / found.model).resolve() == model.resolve()
-    return (found.subject, found.tolerance) if mine else (Subject(), Tolerance())
+    return (found.subject, side, found.tolerance) if mine else _NOBODY
 
 
 def _led(model: Model, recipe: Recipe, reads: Sequence[LoadedTrial]) -> tuple[Model, list[str]]:
@@ -466,9 +469,7 @@ def _reread(recipe: Recipe, folder: Path) -> list[LoadedTrial]:
     return reads
 
 
-def _write(
-    folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[LoadedTrial], about: tuple[Subject, Tolerance]
-) -> Path:
+def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[LoadedTrial], about: _About) -> Path:
     """Write the data set whole or not at all, with `import.toml` in it, and remove the other trials of a former import."""
     kept = changed(recipe, trials=tuple(_relative_to(folder, read.trial) for read in reads))
 
@@ -483,9 +484,9 @@ def _write(
             written.append(part / name)
             entries.append(TrialEntry(name, read.trial.configuration, read.trial.repeat, read.trial.role))
         model.write(part / "model.toml")
-        side, (subject, tolerance) = recipe.convention.force_on, about
-        content = Description(folder.resolve().name, "model.toml", entries, force_on=side, subject=subject, tolerance=tolerance)
-        files.write_text(part / "dataset.toml", content.to_toml(), kind=".toml")
+        force_on, (subject, side, tolerance) = recipe.convention.force_on, about
+        content = Description(folder.resolve().name, "model.toml", entries, force_on=force_on, subject=subject, tolerance=tolerance)
+        files.write_text(part / "dataset.toml", arm_side.to_toml(content, side), kind=".toml")
         files.write_text(part / FILE, kept.to_toml(), kind=".toml")
         try:
             load_dataset(part)
