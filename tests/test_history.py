@@ -339,7 +339,7 @@ def test_a_session_that_is_added_later_is_compared_with_the_one_before_it(identi
 def of_side(result: Identified, side: str | None, number: int) -> Identified:
     """The result of another recording of one arm, by the same name."""
     other = again(result, number)
-    return dataclasses.replace(other, dataset=other.dataset.replace(side=side))
+    return dataclasses.replace(other, dataset=other.dataset.replace(subject=other.dataset.subject.replace(side=side)))
 
 
 def test_sessions_compare_with_those_of_the_same_arm_and_with_the_other_one(identified: Identified, tmp_path: Path) -> None:
@@ -370,7 +370,11 @@ def test_a_side_that_is_stated_later_takes_the_place_of_none(identified: Identif
     assert line.startswith("history, side: found none on 2026-01-05, allowed left as in this session: not compared; state it in [subject]")
     (none,) = sessions.add(file, again(identified, 2), "2026-03-01").warnings
     assert none.startswith("history, side: found none in this session, allowed left as on 2026-02-03")
-    sessions.add(file, dataclasses.replace(identified, dataset=identified.dataset.replace(side="left")), "2026-01-05")
+    sessions.add(
+        file,
+        dataclasses.replace(identified, dataset=identified.dataset.replace(subject=identified.dataset.subject.replace(side="left"))),
+        "2026-01-05",
+    )
     found = sessions.add(file, of_side(identified, "left", 1), "2026-02-03")
     assert all(c.dates == ("2026-01-05", "2026-02-03") for c in found.courses)
 

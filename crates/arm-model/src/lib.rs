@@ -61,7 +61,7 @@ pub use parameter::{Object, ParameterId, ParameterInfo};
 pub use refused::{RefusalKind, Refused, nearest, unknown};
 pub use robot::Robot;
 pub use segment::Segment;
-pub use subject::{Sex, Subject};
+pub use subject::{Sex, Side, Subject};
 pub use tolerance::Tolerance;
 pub use toml_file::{read as read_toml, write as write_toml};
 pub use value::{Table, Value};

@@ -20,7 +20,25 @@ impl Sex {
     }
 }
 
-/// Whose arm it is. Body mass, height and sex are used for the literature values, the name for a history.
+/// Side of the body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Side {
+    /// The left arm.
+    Left,
+    /// The right arm.
+    Right,
+}
+
+const SIDES: [(&str, Side); 2] = [("left", Side::Left), ("right", Side::Right)];
+
+impl Side {
+    /// The word for it in files.
+    pub fn name(self) -> &'static str {
+        SIDES[self as usize].0
+    }
+}
+
+/// Whose arm it is. Body mass, height and sex are used for the literature values, name and side for a history.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Subject {
     /// \[kg\]
@@ -31,6 +49,8 @@ pub struct Subject {
     pub sex: Option<Sex>,
     /// By which sessions of one person are found again.
     pub name: Option<String>,
+    /// Which arm was measured.
+    pub side: Option<Side>,
     /// Measured lengths of the segments, the last one to the handle \[m\]; none where they are scaled with height.
     pub lengths: Vec<f64>,
 }
@@ -52,12 +72,16 @@ impl Subject {
     /// [`Refused`] for an unknown key and for a value out of bounds.
     pub fn from_value(place: &str, value: Value) -> Result<Self, Refused> {
         let mut fields = Fields::new(place, value)?;
-        fields.only(&[], &["body_mass", "height", "sex", "name", "lengths_m"])?;
+        fields.only(
+            &[],
+            &["body_mass", "height", "sex", "name", "side", "lengths_m"],
+        )?;
         Ok(Self {
             body_mass: fields.maybe_number("body_mass", &Self::BODY_MASS)?,
             height: fields.maybe_number("height", &Self::HEIGHT)?,
             sex: fields.choice("sex", &SEXES)?,
             name: fields.maybe_text("name")?,
+            side: fields.choice("side", &SIDES)?,
             lengths: fields.list("lengths_m", &Self::LENGTH)?,
         })
     }
@@ -80,6 +104,7 @@ impl Subject {
         table.push("height", self.height);
         table.push("sex", self.sex.map(Sex::name));
         table.push("name", self.name.clone());
+        table.push("side", self.side.map(Side::name));
         if !self.lengths.is_empty() {
             let lengths = self.lengths.iter().copied().map(Value::Number).collect();
             table.push("lengths_m", Value::List(lengths));

@@ -19,7 +19,7 @@ from ..errors import NO_FILE, ArmrsError, BadInput, BadInputs, Text, nearest
 from ..model import AddedMass, Description, Model, Muscle, Subject, Tolerance, TrialEntry, load_model
 from ..result_warnings import with_warnings
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
-from . import arm_side, files
+from . import files
 from .dataset_errors import dataset_errors_of
 from .muscle_activity import joint_activity, mark_activity
 from .samples import SUFFIXES, write_samples
@@ -67,8 +67,6 @@ class Dataset(Framed, Series):
         Masses that are worn in some configurations besides the model.
     muscles : tuple of Muscle
         The muscles of the activity channels.
-    side : {"left", "right"} or None
-        Which arm of the subject was measured.
     """
 
     name: str
@@ -84,7 +82,6 @@ class Dataset(Framed, Series):
     synthetic: bool = False
     added: tuple[AddedMass, ...] = ()
     muscles: tuple[Muscle, ...] = ()
-    side: str | None = None
 
     def __post_init__(self) -> None:
         checks.instance("model", self.model, Model)
@@ -107,7 +104,6 @@ class Dataset(Framed, Series):
         object.__setattr__(self, "synthetic", checks.flag("synthetic", self.synthetic))
         object.__setattr__(self, "added", checks.instances("added", self.added, AddedMass))
         object.__setattr__(self, "muscles", checks.instances("muscles", self.muscles, Muscle))
-        object.__setattr__(self, "side", arm_side.side_of("side", self.side))
 
     @property
     def fit_trials(self) -> tuple[Trial, ...]:
@@ -230,7 +226,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
     >>> data.trials[0].q.shape
     (100, 2)
     """
-    path, description, side = describe(source)
+    path, description = describe(source)
     folder = path.parent
     model_path = None if description.model is None else folder / description.model
     model = described_model(folder, description)
@@ -271,7 +267,6 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         synthetic=description.synthetic,
         added=description.added,
         muscles=description.muscles,
-        side=side,
     )
 
 
@@ -348,8 +343,8 @@ def naming_trials(trials: Sequence[Trial]) -> Iterator[None]:
         raise error.within(file=file) if isinstance(error, BadInput) else type(error)(f"{file}: {error}") from None
 
 
-def describe(source: str | os.PathLike[str]) -> tuple[Path, Description, str | None]:
-    """Return the path of a `dataset.toml`, its contents, and the side of the arm."""
+def describe(source: str | os.PathLike[str]) -> tuple[Path, Description]:
+    """Return the path of a `dataset.toml` and its contents."""
     path = checks.path("source", source)
     if not os.path.lexists(path):
         raise BadInput("file", NO_FILE, f"a folder with {FILE}, or that file", file=source, kind="missing_source")
@@ -363,7 +358,7 @@ def describe(source: str | os.PathLike[str]) -> tuple[Path, Description, str | N
     with suppress(OSError):  # a data set may lie where nothing can be written
         files.recover(path.parent)
     try:
-        return path, *arm_side.read(path)
+        return path, Description.load(path)
     except BadInput as first:
         raise BadInputs.of(dataset_errors_of(path).found or [first]) from None
 
@@ -428,7 +423,7 @@ def write_dataset(dataset: Dataset, folder: str | os.PathLike[str], *, suffix: s
             table = trial_columns(trial, dataset.force_on)
             write_samples(part / name, list(table), list(table.values()))
         dataset.model.write(part / "model.toml")
-        files.write_text(part / FILE, arm_side.to_toml(content, dataset.side), kind=".toml")
+        files.write_text(part / FILE, content.to_toml(), kind=".toml")
         return [*(part / name for name in names), part / "model.toml", part / FILE]
 
     return files.write_whole(out, write)[-1]

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import BadInput
 from ..model import Description, TrialEntry
-from . import arm_side, tomlfile
+from . import tomlfile
 
 _MOST = 100
 _UNKNOWN = re.compile(r"unknown key '(.*)'")
@@ -70,7 +70,7 @@ def dataset_errors_of(path: Path) -> DatasetErrors:
 
 def _read(document: dict[str, Any]) -> Description | BadInput:
     try:
-        return Description.from_dict(arm_side.taken(document)[0])
+        return Description.from_dict(document)
     except BadInput as error:
         return error
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Sentence, Text, unreadable
-from . import arm_side, files
+from . import files
 from .dataset import FILE, describe, described_model, name_of, output_names
 from .samples import NUMBER, SUFFIXES, csv_place, explain_csv, header_of, parquet_table, write_table
 
@@ -67,7 +67,7 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
         target = out / path.with_suffix(suffix).name
         files.not_an_input([target], [path])
         return [_write(_job(path, target))]
-    described, description, side = describe(path)
+    described, description = describe(path)
     described_model(described.parent, description)  # a data set without a sound model is not worth converting
     named = [] if description.model is None else [described.parent / description.model]
     names = output_names([entry.file for entry in description.trials], suffix)
@@ -76,9 +76,7 @@ def convert(source: str | os.PathLike[str], folder: str | os.PathLike[str], *, t
     files.not_an_input([*targets, out / FILE, out / "model.toml"], [*sources, described, *named])
     models = [path.read_text(encoding="utf-8") for path in named]
     entries = [entry.replace(file=name) for entry, name in zip(description.trials, names, strict=True)]
-    content = arm_side.to_toml(
-        description.replace(name=name_of(described, description), model="model.toml" if named else None, trials=entries), side
-    )
+    content = description.replace(name=name_of(described, description), model="model.toml" if named else None, trials=entries).to_toml()
 
     if (out / FILE).exists() and (out / FILE).read_bytes() != content.encode("utf-8"):
         raise BadInput("folder", Sentence("this folder holds another data set"), files.ANOTHER, file=out)

@@ -133,7 +133,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
         return Checked(
             tuple(problems), tuple(Ability(verb, False, "the data set cannot be read") for verb in ("identify", "passive", "gap"))
         )
-    path, description, side = described
+    path, description = described
     model = _caught(lambda: described_model(path.parent, description), problems)
     trials = _trials(path.parent, description, description.trials, model, problems)
     if model is None or not trials:
@@ -157,7 +157,7 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     tell("clocks", 0.6)
     problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
     blocked = any(p.level == "error" for p in problems)
-    whole = dataset.replace(folder=path.parent, added=description.added, side=side)
+    whole = dataset.replace(folder=path.parent, added=description.added, subject=description.subject)
     other = _other_arm(whole)
     problems += other
     tell("passive moments", 0.8)

@@ -15,7 +15,7 @@ from .. import checks
 from ..anthropometry import JOINTS, UNCERTAINTY, literature_arm, segments_of
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
-from ..io import arm_side, tomlfile
+from ..io import tomlfile
 from ..model import AddedMass, Contact, Joint, Model, Robot, Subject, Tolerance, load_model
 from .force_sensor import SixAxis
 from .interaction import PERIOD, Interaction, Perturbation, Support
@@ -186,8 +186,6 @@ class Experiment:
     tolerance : Tolerance
     file : str, optional
         Where it was read, for refusals.
-    side : {"left", "right"}, optional
-        Which arm of the subject it is.
     interaction : Interaction, optional
         How the handle yields; without it the robot follows the movement stiffly.
     support : Support, optional
@@ -209,7 +207,6 @@ class Experiment:
     faults: tuple[Fault, ...]
     tolerance: Tolerance
     file: str | None = None
-    side: str | None = None
     interaction: Interaction | None = None
     support: Support | None = None
     perturbation: Perturbation | None = None
@@ -257,7 +254,6 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
     ]
     checks.keys("", document, required=["movement"], optional=["name", "seed", "model", "believed", *tables])
     seed = checks.whole("seed", document.get("seed", 1), least=0, most=2**53)
-    document, side = arm_side.taken(document)
     subject, truth, believed = _arms(document, path, seed, alter)
     n = truth.n_joints
     runs = tuple(_run(f"[[movement]] {k}", t, n) for k, t in enumerate(checks.tables("movement", document["movement"]), 1))
@@ -292,7 +288,6 @@ def experiment_of(document: Mapping[str, Any], path: Path, alter: Callable[[Mode
         faults=faults,
         tolerance=Tolerance.from_dict(document.get("tolerance", {}), "[tolerance]"),
         file=str(path),
-        side=side,
         interaction=interaction,
         support=support,
         perturbation=perturbation,

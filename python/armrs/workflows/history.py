@@ -199,7 +199,7 @@ def _foreseen(file: Path, result: Followed, subject: str, date: str) -> History:
         session, replaced = _write(memory, result, subject, date, file)
         if session is None:
             line = f"history: no quantity of {show(result.dataset.name)} on {date} has an interval (no repeats?): it is not added"
-            return History(subject, (), (line,), date, result.dataset.side)
+            return History(subject, (), (line,), date, result.dataset.subject.side)
         found = history_of(memory, result.method, _whose(memory), session)
         if not replaced:
             return found
@@ -231,7 +231,7 @@ def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> tupl
     if not estimates:
         return None, False
     data, recorded = result.dataset, _recorded(result.dataset)
-    name = data.name if data.side is None else f"{data.name} ({data.side} arm)"
+    name = data.name if data.subject.side is None else f"{data.name} ({data.subject.side} arm)"
     # A former result may have been stored before its side was stated, or its data set named otherwise.
     former = connection.execute(
         "DELETE FROM session WHERE date = ? AND method = ? AND (name IN (?, ?) OR id IN "
@@ -240,7 +240,7 @@ def _insert(connection: sqlite3.Connection, result: Followed, date: str) -> tupl
     )
     key = (name, date, result.method, data.model.n_joints)
     made = connection.execute("INSERT INTO session (name, date, method, joints) VALUES (?, ?, ?, ?)", key).lastrowid
-    connection.execute("INSERT INTO arm VALUES (?, ?, ?)", (made, data.side or "", recorded))
+    connection.execute("INSERT INTO arm VALUES (?, ?, ?)", (made, data.subject.side or "", recorded))
     rows = [(made, *k, e.value, _deviation(e, result.level), e.unit, e.decided_by) for k, e in estimates.items()]
     connection.executemany("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
     return made, former.rowcount > 0
@@ -263,9 +263,9 @@ def _refuse_copy(connection: sqlite3.Connection, dataset: Dataset, date: str, fi
     )
     for name, there, side in rows:
         arm = f" of the {side} arm" if side else ""
-        if there != date or (side and dataset.side and side != dataset.side):
+        if there != date or (side and dataset.subject.side and side != dataset.subject.side):
             found = Text(f"the recording that it has as {show(name)} on {there}{arm}, sample for sample")
-            own = f" of the {dataset.side} arm" if dataset.side else ""
+            own = f" of the {dataset.subject.side} arm" if dataset.subject.side else ""
             allowed = f"another recording for the session on {date}{own}"
             raise BadInput("history", found, allowed, file=file, hint=f"--date {there} replaces that result")
 

@@ -11,7 +11,7 @@ from typing import Any
 from .. import checks
 from ..anthropometry import SEGMENTS, UNCERTAINTY, check_lengths, literature_model
 from ..errors import BadInput, Text
-from ..io import arm_side, files
+from ..io import files
 from ..model import Model, Robot, Segment, Subject
 from ..tabular import Framed, Tidy
 
@@ -122,7 +122,6 @@ def initialise(
     """
     target = files.output_folder(folder)
     checks.flag("replace", replace)
-    side = arm_side.side_of("side", side)
     check_lengths(lengths)
     worn = checks.instances("worn", worn, Worn)
     if robot is not None:
@@ -130,7 +129,7 @@ def initialise(
     for name in ("dataset.toml", "model.toml"):
         if (target / name).exists() and not replace:
             raise BadInput("folder", Text(f"a {name} that exists"), "a folder without one, or --force", file=folder)
-    model = literature_model(Subject(body_mass, height, sex), lengths).replace(robot=robot)
+    model = literature_model(Subject(body_mass, height, sex, side=side), lengths).replace(robot=robot)
     segments = model.segments
     for item in worn:
         model = model.with_mass(item.segment, item.mass, item.at)

@@ -14,13 +14,13 @@ import numpy as np
 from .. import _armrs, checks
 from ..catalogue import catalogue
 from ..errors import ArmrsError, BadInput, Sentence, Text
-from ..io import arm_side, files
+from ..io import files
 from ..io.dataset import FILE, Dataset, write_dataset
 from ..io.markers import Markers, planar_motion
 from ..io.opensim import write_trc
 from ..io.samples import write_samples
 from ..io.trial import FEWEST_SAMPLES, Trial
-from ..model import AddedMass, Effect, Model
+from ..model import AddedMass, Description, Effect, Model
 from ..tabular import Tabular, Tidy
 from .core_experiment import CoreRun, driven
 from .experiment import Devices, Experiment, Fault, Run, load_experiment
@@ -181,7 +181,6 @@ def measure(experiment: Experiment, *, step: Callable[[int], None] = lambda done
         force_on="robot",
         sample_rate=experiment.devices.rate_Hz,
         subject=experiment.subject,
-        side=experiment.side,
         tolerance=experiment.tolerance,
         synthetic=True,
         added=_added(experiment.runs, {trial.configuration for trial, _, _ in kept}),
@@ -549,7 +548,7 @@ def _former(out: Path) -> set[Path]:
         return set()
     if not (out / "truth" / "truth.toml").is_file():
         raise BadInput("folder", Sentence("this folder holds a data set that armrs record did not write"), files.ANOTHER, file=out)
-    names = [name for entry in arm_side.read(out / FILE)[0].trials if (name := Path(entry.file)).parent == Path("trials")]
+    names = [name for entry in Description.load(out / FILE).trials if (name := Path(entry.file)).parent == Path("trials")]
     markers = {out / "markers" / name.with_suffix(".trc").name for name in names}
     return {out / name for name in names} | markers | {out / "wrench" / name.name for name in names}
 

@@ -42,7 +42,7 @@ def data_of(dataset: Dataset) -> dict[str, Any]:
     return {
         "name": dataset.name,
         "subject": dataset.subject.name,
-        "side": dataset.side,
+        "side": dataset.subject.side,
         "synthetic": dataset.synthetic,
         "joints": [joint.name for joint in dataset.model.joints],
         "range_deg": ranges(dataset),

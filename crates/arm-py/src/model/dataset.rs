@@ -110,7 +110,7 @@ value_class!(
     ]
 );
 
-/// Whose arm it is. Body mass, height and sex are used for the literature values, the name for a history.
+/// Whose arm it is. Body mass, height and sex are used for the literature values, name and side for a history.
 ///
 /// Parameters
 /// ----------
@@ -120,6 +120,8 @@ value_class!(
 ///     [m]
 /// sex : {"male", "female"}, optional
 /// name : str, optional
+/// side : {"left", "right"}, optional
+///     Which arm was measured.
 /// lengths_m : sequence of float, optional
 ///     Measured lengths of the segments, the last one to the handle [m]; without them they are scaled with height.
 ///
@@ -140,12 +142,13 @@ pub struct Subject(pub arm_model::Subject);
 #[pymethods]
 impl Subject {
     #[new]
-    #[pyo3(signature = (body_mass=None, height=None, sex=None, name=None, lengths_m=None))]
+    #[pyo3(signature = (body_mass=None, height=None, sex=None, name=None, side=None, lengths_m=None))]
     fn new(
         body_mass: Option<Any<'_, '_>>,
         height: Option<Any<'_, '_>>,
         sex: Option<Any<'_, '_>>,
         name: Option<Any<'_, '_>>,
+        side: Option<Any<'_, '_>>,
         lengths_m: Option<Any<'_, '_>>,
     ) -> PyResult<Self> {
         let given = [
@@ -153,6 +156,7 @@ impl Subject {
             ("height", height),
             ("sex", sex),
             ("name", name),
+            ("side", side),
             ("lengths_m", lengths_m),
         ];
         built("", table(given))
@@ -177,6 +181,11 @@ impl Subject {
     fn name(&self) -> Option<&str> {
         self.0.name.as_deref()
     }
+    /// Which arm was measured: "left" or "right".
+    #[getter]
+    fn side(&self) -> Option<&'static str> {
+        self.0.side.map(arm_model::Side::name)
+    }
     /// Measured lengths of the segments [m]; None where they are scaled with height.
     #[getter]
     fn lengths_m<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyTuple>>> {
@@ -192,6 +201,7 @@ value_class!(
         ("height", "m"),
         ("sex", ""),
         ("name", ""),
+        ("side", ""),
         ("lengths_m", "m")
     ]
 );

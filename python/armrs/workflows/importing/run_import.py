@@ -13,7 +13,7 @@ import numpy as np
 
 from ... import checks
 from ...errors import BadInput, BadInputs, Sentence, Text, unknown_name
-from ...io import arm_side, files
+from ...io import files
 from ...io.dataset import load_dataset
 from ...io.raw import RawTable
 from ...io.raw.units import unit
@@ -34,9 +34,9 @@ _READ, _DECIDED = 0.5, 0.9
 """Shares of the work after which recordings are read, and after which conventions are decided."""
 _NAMED = 8
 """Columns that a line names at most."""
-_About = tuple[Subject, str | None, Tolerance]
-"""What a data set says besides its recordings: whose arm, which one, and how well the devices are calibrated."""
-_NOBODY: _About = (Subject(), None, Tolerance())
+_About = tuple[Subject, Tolerance]
+"""What a data set says besides its recordings: whose arm, and how well the devices are calibrated."""
+_NOBODY: _About = (Subject(), Tolerance())
 
 
 @dataclass(frozen=True)
@@ -177,13 +177,13 @@ def model_file(sources: Sequence[str | os.PathLike[str]], model: str | os.PathLi
 
 
 def _about_of(model: Path) -> _About:
-    """Return `[subject]`, the side of the arm and `[tolerance]` of the data set that a model lies in, as `armrs init` writes it."""
+    """Return `[subject]` and `[tolerance]` of the data set that a model lies in, as `armrs init` writes it."""
     path = model.parent / "dataset.toml"
     if not path.is_file():
         return _NOBODY
-    found, side = arm_side.read(path)
+    found = Description.load(path)
     mine = found.model is not None and (path.parent / found.model).resolve() == model.resolve()
-    return (found.subject, side, found.tolerance) if mine else _NOBODY
+    return (found.subject, found.tolerance) if mine else _NOBODY
 
 
 def _led(model: Model, recipe: Recipe, reads: Sequence[LoadedTrial]) -> tuple[Model, list[str]]:
@@ -484,9 +484,9 @@ def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: 
             written.append(part / name)
             entries.append(TrialEntry(name, read.trial.configuration, read.trial.repeat, read.trial.role))
         model.write(part / "model.toml")
-        force_on, (subject, side, tolerance) = recipe.convention.force_on, about
+        force_on, (subject, tolerance) = recipe.convention.force_on, about
         content = Description(folder.resolve().name, "model.toml", entries, force_on=force_on, subject=subject, tolerance=tolerance)
-        files.write_text(part / "dataset.toml", arm_side.to_toml(content, side), kind=".toml")
+        files.write_text(part / "dataset.toml", content.to_toml(), kind=".toml")
         files.write_text(part / FILE, kept.to_toml(), kind=".toml")
         try:
             load_dataset(part)
