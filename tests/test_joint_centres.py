@@ -52,13 +52,15 @@ BENT = (((-60.0, 30.0), (-60.0, 110.0)), ((-70.0, 60.0), (-20.0, 60.0)))
 
 
 def misplaced(data: armrs.Dataset, draw: np.random.Generator) -> armrs.Dataset:
-    """Return a session whose markers sit beside the joints, on trunk and segments, and are carried along by the skin."""
+    """Return a session whose markers sit beside the joints, on trunk and segments, and are carried along by the skin; where a robot shows
+    it, the clock of the cameras is off as well."""
     n, lengths = data.model.n_joints, np.array([s.length for s in data.model.segments])
     offsets = uncertainty.LENGTH_STD / np.sqrt(2.0) * draw.standard_normal((n + 1, 2))
     skin = joint_centres.SKIN_STD * draw.standard_normal((n, 2))
+    late = 0.0 if data.trials[0].robot_q is None else data.tolerance.time_delay_s * draw.standard_normal()
     angles, distances = [], []
     for trial in data.trials:
-        q, at = trial.q, np.zeros((len(trial.q), 2))
+        q, at = np.column_stack([np.interp(trial.t + late, trial.t, column) for column in trial.q.T]), np.zeros((len(trial.q), 2))
         markers = [at + offsets[0] + skin[0] * (q[:, :1] + 0.5 * np.pi)]
         for k, direction in enumerate(np.exp(1j * np.cumsum(q, axis=1)).T):
             at = at + lengths[k] * np.column_stack([direction.real, direction.imag])

@@ -33,7 +33,7 @@ from ..io.trial import FEWEST_SAMPLES, Trial
 from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
 from .identify import Estimate
-from .setup_check import find_wrong_setup
+from .setup_check import setup_warnings
 
 DEFAULT_CUTOFF = 1.0
 """Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
@@ -332,9 +332,9 @@ def passive_moments(
     given, centres = dataset, joint_centres.find(dataset)
     dataset = centres.applied(given)
     trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
+    passivity_checks.refuse_absurd(dataset, ((m.trial, m.moment) for m in trials))
     trials, conditioned = _without_preconditioning(trials)
-    wrong = find_wrong_setup(dataset)
-    curves, warnings = [], [*([] if wrong is None else [str(wrong)]), *conditioned]
+    curves, warnings = [], [*setup_warnings(dataset), *centres.warnings(), *conditioned]
     configurations = list(dict.fromkeys(t.configuration for t in dataset.trials))
     for k, configuration in enumerate(configurations):
         tell(f"passive moments of {configuration}", k / len(configurations))
@@ -510,7 +510,7 @@ def _shifts(
     if there.any():
         force = None if moments.force is None else moments.force[there]
         declared = uncertainty.sensitivity(model, moments.q[there], force, deviations)
-        placed = uncertainty.placements(model, moments.q[there], force, centres.unknown(model, moments.q[there]), spring)
+        placed = uncertainty.placements(model, moments.q[there], force, centres.unknown(model, moments.q[there], moments.qd[there]), spring)
         values[:, there] = np.concatenate([declared[:, :, joint], placed])
     rising, falling = (np.array([_binned(moments, row, joint, sign, edges) for row in values]) for sign in (1, -1))
     return rising, falling
