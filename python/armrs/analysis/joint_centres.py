@@ -26,9 +26,9 @@ from .uncertainty import LENGTH_STD, Deviations
 
 SKIN_STD = 0.002
 """Standard deviation of how far skin carries a marker along and across its segment, for each radian of the next joint [m/rad]."""
-_PATH_STD = 0.00005
+_PATH_STD = 0.0001
 """Least standard deviation of the distance of hand and handle in one posture about the fit [m], which every session shows itself: the
-repeatability of robots, 0.03 to 0.1 mm by their data sheets."""
+repeatability of robots is 0.03 to 0.1 mm by their data sheets."""
 _POSTURES = 10
 """Independent postures of one movement, whatever its rate and its repeats: errors of this distance are alike in neighbouring ones."""
 _BASE_STD = 0.01
