@@ -277,11 +277,11 @@ class PassiveMoments(Tabular):
 
 
 def _interval(values: np.ndarray, shared: float = 0.0) -> tuple[float, float]:
-    """Return the interval of the mean of repeats by Student's t, with a standard deviation that they share; NaN for fewer than two."""
+    """Return the interval of the mean of repeats, with a standard deviation that they share; NaN for fewer than two."""
     if len(values) < 2:
         return (float("nan"), float("nan"))
-    mean, half = float(values.mean()), students_t.quantile(LEVEL, len(values) - 1) * float(values.std(ddof=1)) / np.sqrt(len(values))
-    half = float(np.hypot(half, 1.96 * shared))
+    mean, scatter = float(values.mean()), float(values.std(ddof=1)) / np.sqrt(len(values))
+    half = students_t.half_width(LEVEL, scatter, len(values) - 1, shared)
     return (mean - half, mean + half)
 
 
