@@ -148,10 +148,10 @@ def find(dataset: Dataset) -> JointCentres:
         return _of(prior, misplaced)
     told = [fit for fit in others if fit.possible and fit.cost < others[0].cost + _UNDECIDED]
     apart = float(np.sqrt(np.mean(np.sum(np.concatenate([_apart(model, t) for t in seen]) ** 2, axis=1))))
-    known = {"contradicted": True, "causes": tuple(fit.named() for fit in told), "apart": apart}
+    causes = tuple(fit.named() for fit in told)
     arm = [fit for fit in told or others if fit.cause is not None and fit.cause.of_arm]
     if told and not arm:
-        return dataclasses.replace(_of(prior, told[0]), **known)
+        return dataclasses.replace(_of(prior, told[0]), contradicted=True, causes=causes, apart=apart)
     # What the arm's angles may be wrong by is an error of this session. The clock of the cameras depends on no zero.
     wrong, last = np.zeros((len(sizes), len(arm) + 1)), len(sizes) - 1
     for k, fit in enumerate(arm):
@@ -160,7 +160,8 @@ def find(dataset: Dataset) -> JointCentres:
     if told:
         shift, wrong[last, -1] = shift + told[0].solution[last] * np.eye(len(sizes))[last], np.sqrt(told[0].covariance[last, last])
     factor = np.column_stack([prior.factor, wrong])
-    return dataclasses.replace(prior, shift=shift, factor=factor[:, factor.any(axis=0)], **known)
+    factor = factor[:, factor.any(axis=0)]
+    return dataclasses.replace(prior, shift=shift, factor=factor, contradicted=True, causes=causes, apart=apart)
 
 
 @dataclass(frozen=True)
@@ -294,7 +295,9 @@ def _fitted(session: tuple[Dataset, Sequence[Trial], np.ndarray, np.ndarray], ca
     # A wrong zero turns by degrees, which is not linear in it: the path is computed again with what is known of it.
     known = np.zeros(len(scale))
     for _ in range(_ITERATIONS):
-        precision, moment, paths = np.eye(len(scale)), -known / np.where(scale > 0.0, scale, 1.0), []
+        paths = []
+        precision = np.eye(len(scale))
+        moment: np.ndarray = -known / np.where(scale > 0.0, scale, 1.0)
         for trial in trials:
             beside, rows = _path(dataset.model_of(trial.configuration), trial, elongation, known)
             if len(beside):
