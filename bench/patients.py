@@ -157,6 +157,7 @@ mass = 0.193
 rate_Hz = 200
 marker_offset_m = 0.0014
 marker_skin_m_rad = 0.002
+clock_offset_s = {clock}
 emg = true
 
 [variation]
@@ -183,13 +184,17 @@ kind = "force_{kind}"
 channel = "{channel}"
 {kind} = {value}
 """
+CLOCK, BASE, COMPLIANCE = 0.005, 0.01, 0.5
+"""Standard deviations of what each session of the laboratory has anew: clock of the cameras [s], place of the first joint relative to the
+robot [m], compliance of the contact (relative); the sizes that the analysis assumes (`[tolerance]`, `joint_centres`)."""
 LABORATORY_SPEEDS = (0.3, 1.0, 1.8, 2.7, 3.6)
 """Speeds of the stretches in the laboratory [rad/s]."""
 
 
 def recorded(patient: Patient, seed: int) -> Dataset:
-    """Return a session of the virtual laboratory."""
-    values = dataclasses.asdict(patient)
+    """Return a session of the virtual laboratory; its model has the place of the shoulder and the compliance of the contact with errors."""
+    draw = np.random.default_rng([seed, 5])
+    values = dataclasses.asdict(patient) | {"clock": CLOCK * draw.standard_normal()}
     said = EXPERIMENT.format(**values | {"person": PERSON, "seed": values["person"]})
     said += "".join(STRETCH.format(number=k, speed=s, acceleration=max(4.0, 12.0 * s)) for k, s in enumerate(LABORATORY_SPEEDS))
     for kind, values in (("gain", patient.force_gains), ("bias", patient.force_biases)):
@@ -197,4 +202,11 @@ def recorded(patient: Patient, seed: int) -> Dataset:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "EXPERIMENT.toml"
         file.write_text(said, encoding="utf-8")
-        return measure(dataclasses.replace(load_experiment(file), seed=seed)).dataset
+        data = measure(dataclasses.replace(load_experiment(file), seed=seed)).dataset
+    robot, contact = data.model.robot, data.model.contact
+    assert robot is not None and contact is not None
+    place = np.array(robot.base) + BASE * draw.standard_normal(2)
+    yields = np.exp(COMPLIANCE * draw.standard_normal(2))
+    robot = robot.replace(base=tuple(place.tolist()))
+    contact = contact.replace(stiffness=tuple((np.array(contact.stiffness) / yields).tolist()))
+    return data.replace(model=data.model.replace(robot=robot, contact=contact))

@@ -5,8 +5,9 @@
 Each patient of `bench/patients.py` (laws written there anew, tone that drifts from trial to trial, muscle activity) is drawn, and recorded
 twice. In every second one the reflex' gain is a fifth larger or smaller in the second session. Both sessions go through `armrs spasticity`
 and its history; what it calls changed is compared with the truth. With `--laboratory` it is the virtual laboratory of `armrs record` that
-records them: an arm of two segments led by a controlled robot, with cameras, a force sensor, tone and EMG. There the passive stiffness of
-the last two of four patients changes too, and `armrs passive` is run as well; `--passive` runs that alone.
+records them: an arm of two segments led by a controlled robot, with cameras, a force sensor, tone and EMG. Markers, the clock of the
+cameras, the place of the shoulder and the compliance of the contact are wrong anew in each session. There the passive stiffness of the last
+two of four patients changes too, and `armrs passive` is run as well; `--passive` runs that alone.
 
 Exit status: 0 when every figure holds, 1 when one does not.
 """

@@ -13,7 +13,7 @@ import pytest
 
 import armrs
 from armrs.analysis import repeat_statistics
-from armrs.io.muscle_activity import _applied, co_contraction, comparable, joint_activity, mark_activity
+from armrs.io.muscle_activity import _applied, co_contraction, comparable, joint_activity, mark_activity, onset
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import check_passive
@@ -352,3 +352,24 @@ def test_muscles_of_a_data_set_are_written_read_and_refused(tmp_path: Path) -> N
     file.write_text(text.replace(table, table + table), encoding="utf-8")
     with pytest.raises(armrs.BadInput, match=r"\[\[muscle\]\] 2, channel: .*each channel once"):
         armrs.load_dataset(tmp_path)
+
+
+@pytest.mark.parametrize(("rise", "ratio", "bias", "spread"), [
+    (0.0, 3.2, 3.0, 9.0), (0.0, 5.6, 1.0, 4.0), (0.0, 10.0, 1.0, 3.0), (0.05, 5.6, 7.0, 12.0), (0.05, 10.0, 5.0, 8.0),
+])  # fmt: skip
+def test_an_onset_is_where_activity_begins(rise: float, ratio: float, bias: float, spread: float) -> None:
+    """Amplitudes so many times that of rest, at once or over 50 ms; the alarm came up to 35 ms later [ms]."""
+    draw, late = np.random.default_rng(5), []
+    t = np.arange(0.0, 1.5, 1e-3)
+    grown = np.clip((t - 0.7) / rise, 0.0, 1.0) if rise else (t >= 0.7).astype(float)
+    for _ in range(60):
+        # White noise between 20 and 450 Hz, as surface electrodes record it.
+        noise = np.fft.rfft(draw.standard_normal(len(t)))
+        frequency = np.fft.rfftfreq(len(t), 1e-3)
+        noise[(frequency < 20.0) | (frequency > 450.0)] = 0.0
+        signal = np.fft.irfft(noise, len(t)) * (1.0 + (ratio - 1.0) * grown)
+        one = armrs.Trial("a.csv", "a", 1, "fit", t, np.zeros((len(t), 1)), emg={"emg_a": signal})
+        found = onset(one, "emg_a", 0.5, 1.2)
+        assert found is not None
+        late.append(1e3 * (found - 0.7))
+    assert abs(np.mean(late)) < bias and np.std(late) < spread, (np.mean(late), np.std(late))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from .. import _armrs
+from ..errors import BadInput, Text
+from ..io.dataset import Dataset
 from ..io.trial import Trial
 
 WINDOW = 0.2
@@ -18,6 +21,8 @@ SLOW = 0.1
 CLEAR = 3.0
 """A half width is clearly below zero when it is so many half widths of its 95 % interval: chance does that in one of a thousand joints
 without friction at four repeats."""
+_ABSURD = 3.0
+"""Joint moments are at most this many times what measured forces exert and the arm weighs: inertia is what an arm that is led adds."""
 
 
 @dataclass(frozen=True)
@@ -109,3 +114,30 @@ def gives_energy(half_widths: Sequence[tuple[str, int, tuple[float, float]]]) ->
         f"half width of the hysteresis below zero: {joints}: a relaxed joint gives no energy. Are angles or forces in another unit or "
         "direction, or late against each other, or were muscles active?"
     ]
+
+
+def refuse_absurd(dataset: Dataset, moments: Iterable[tuple[Trial, np.ndarray]]) -> None:
+    """Refuse moments that what was measured cannot exert: motion is then not that of the arm, or a unit is wrong.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    moments : iterable of (Trial, ndarray)
+        With which joints resist in each trial, NaN where nothing was measured [N m].
+
+    Raises
+    ------
+    BadInput
+        Names the trial, the moment and what the arm can resist with.
+    """
+    for trial, moment in moments:
+        model = dataset.model_of(trial.configuration)
+        able = model.gravity * float(np.sum(np.abs(_armrs.Arm.from_model(model).first_moments)))
+        for measured, arm in ((trial.force_on_arm, sum(s.length for s in model.segments)), (trial.moment_on_arm, 1.0), (trial.tau, 1.0)):
+            if measured is not None and np.isfinite(measured).any():
+                able += arm * np.sqrt(2.0) * float(np.nanmax(np.abs(measured)))
+        most = float(np.max(np.abs(moment[np.isfinite(moment)]), initial=0.0))
+        if most > _ABSURD * able:
+            allowed = f"at most {_ABSURD * able:.3g} N m, {_ABSURD:g} times what force and weight exert"
+            found = Text(f"a joint moment of {most:.3g} N m")
+            raise BadInput("angles and forces", found, allowed, file=trial.file, hint="jumps of the angles, or a wrong unit?")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 
 def quantile(level: float, freedom: float) -> float:
     """Return the half width of a two-sided interval in standard deviations.
@@ -23,3 +25,12 @@ def chance(value: float, std: float, freedom: float) -> float:
     from scipy.stats import t as student
 
     return float(2.0 * student.sf(abs(value) / std, freedom)) if std > 0.0 else float(value == 0.0)
+
+
+def half_width(level: float, scatter: float, freedom: float, known: float) -> float:
+    """Return half an interval from a deviation that is estimated and one that is known, independent of each other.
+
+    The degrees of freedom of their sum are those of Welch (1947) and Satterthwaite, as in the guide to the expression of uncertainty, G.4.
+    """
+    std = float(np.hypot(scatter, known))
+    return std * quantile(level, freedom * (std / max(scatter, 1e-3 * std)) ** 4) if std > 0.0 else 0.0

@@ -29,6 +29,10 @@ ONSET_SMOOTHED, ONSET_HELD, LEAST_REST = 0.01, 0.025, 0.05
 """Time over which the rectified signal is averaged for an onset, for which it must last, and of rest before it [s]."""
 ONSET_DEVIATIONS = 3.0
 """Of rest that an onset must exceed."""
+ONSET_BEFORE = 0.15
+"""How long before that an onset is looked for [s]: the averages and a gradual rise delay the alarm by less."""
+_RISES = 24
+"""Slopes of a gradual onset that are compared."""
 _TO_SIGMA = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
@@ -251,23 +255,71 @@ def _widened(mark: np.ndarray, dt: float) -> np.ndarray:
     return wide
 
 
-def onset(trial: Trial, name: str, start: float, end: float) -> float | None:
-    """Return when a channel becomes active in a stretch [s]: above rest by three deviations for 25 ms (Hodges and Bui 1996).
+def onset(trial: Trial, name: str, start: float, end: float, quiet: float | None = None) -> float | None:
+    """Return when a channel becomes active in a stretch [s].
 
-    Rest is what the channel does before `start`; None where there is less than 50 ms of that, no such channel or no activity up to `end`.
+    Activity is what exceeds rest by three deviations for 25 ms (Hodges and Bui 1996). An average delays that, and a gradual onset more: the
+    onset is the most probable time of a change of the amplitude of the single samples before, a step or a ramp (approximated generalized
+    likelihood ratio, Staude 2001).
+
+    Parameters
+    ----------
+    trial : Trial
+    name : str
+        Of the channel.
+    start, end : float
+        Between which an onset counts [s].
+    quiet : float, optional
+        Up to when the channel rests, where less than 50 ms were recorded before `start` [s].
+
+    Returns
+    -------
+    float or None
+        None where less than 50 ms of rest were recorded, and for no such channel or no activity up to `end`.
     """
     signal = trial.emg.get(name)
     if signal is None or not np.isfinite(signal).all():
         return None
-    rectified = np.abs(signal - np.median(signal)) if signal.min() < 0.0 else signal
+    raw = bool(signal.min() < 0.0)
+    centred = signal - np.median(signal) if raw else signal
+    rectified = np.abs(centred)
     width = max(1, round(ONSET_SMOOTHED / trial.dt))
-    # The mean of the samples up to each: an onset is not seen before it is.
+    # The mean of the samples up to each: nothing later is in it.
     envelope = np.convolve(rectified, np.full(width, 1.0 / width))[: len(rectified)]
-    rest = envelope[(trial.t < start) & (np.arange(len(envelope)) >= width)]
-    if len(rest) * trial.dt < LEAST_REST:
+    counted = np.arange(len(envelope)) >= width
+    resting = counted & (trial.t < start)
+    if quiet is not None and resting.sum() * trial.dt < LEAST_REST:
+        start = quiet
+        resting = counted & (trial.t < quiet)
+    if resting.sum() * trial.dt < LEAST_REST:
         return None
+    rest = envelope[resting]
     above = envelope > rest.mean() + ONSET_DEVIATIONS * max(float(rest.std()), 1e-12)
     held = max(1, round(ONSET_HELD / trial.dt))
     lasting = np.convolve(above, np.ones(held), mode="valid") > held - 0.5
     there = np.flatnonzero(lasting & (trial.t[: len(lasting)] >= start) & (trial.t[: len(lasting)] <= end))
-    return float(trial.t[there[0]]) if there.size else None
+    if not there.size:
+        return None
+    first = max(int(np.argmax(trial.t >= start)), there[0] - round(ONSET_BEFORE / trial.dt))
+    changed = _change(centred[first : there[0] + held], raw, centred[resting])
+    return float(trial.t[first + changed])
+
+
+def _change(values: np.ndarray, raw: bool, rest: np.ndarray) -> int:
+    """Return the sample from which on a signal differs from rest, by the most probable step or ramp of its amplitude.
+
+    A raw signal is normally distributed about zero with that standard deviation; an envelope has it as its mean, with the scatter of rest.
+    """
+    level, scatter = (float(np.sqrt(np.mean(rest**2))), 0.0) if raw else (float(rest.mean()), max(float(rest.std()), 1e-12))
+    level, n = max(level, 1e-12), len(values)
+    after = np.arange(n)[None, :] - np.arange(n - 1)[:, None]
+    sizes = np.geomspace(0.25, 64.0, _RISES) * (level if raw else scatter)
+    best, found = np.inf, 0
+    for shape in ((after >= 0).astype(float), np.maximum(after + 1.0, 0.0) / n):
+        for size in sizes:
+            amplitude = level + size * shape
+            cost = 2.0 * np.log(amplitude) + (values / amplitude) ** 2 if raw else ((values - amplitude) / scatter) ** 2
+            total = cost.sum(axis=1)
+            if total.min() < best:
+                best, found = float(total.min()), int(np.argmin(total))
+    return found

@@ -33,7 +33,7 @@ from ..io.trial import FEWEST_SAMPLES, Trial
 from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
 from .identify import Estimate
-from .setup_check import find_wrong_setup
+from .setup_check import setup_warnings
 
 DEFAULT_CUTOFF = 1.0
 """Cutoff of the low-pass [Hz]; slow movements have nothing above it."""
@@ -277,11 +277,11 @@ class PassiveMoments(Tabular):
 
 
 def _interval(values: np.ndarray, shared: float = 0.0) -> tuple[float, float]:
-    """Return the interval of the mean of repeats by Student's t, with a standard deviation that they share; NaN for fewer than two."""
+    """Return the interval of the mean of repeats, with a standard deviation that they share; NaN for fewer than two."""
     if len(values) < 2:
         return (float("nan"), float("nan"))
-    mean, half = float(values.mean()), students_t.quantile(LEVEL, len(values) - 1) * float(values.std(ddof=1)) / np.sqrt(len(values))
-    half = float(np.hypot(half, 1.96 * shared))
+    mean, scatter = float(values.mean()), float(values.std(ddof=1)) / np.sqrt(len(values))
+    half = students_t.half_width(LEVEL, scatter, len(values) - 1, shared)
     return (mean - half, mean + half)
 
 
@@ -332,9 +332,9 @@ def passive_moments(
     given, centres = dataset, joint_centres.find(dataset)
     dataset = centres.applied(given)
     trials = tuple(trial_moments(dataset, trial, cutoff) for trial in dataset.trials)
+    passivity_checks.refuse_absurd(dataset, ((m.trial, m.moment) for m in trials))
     trials, conditioned = _without_preconditioning(trials)
-    wrong = find_wrong_setup(dataset)
-    curves, warnings = [], [*([] if wrong is None else [str(wrong)]), *conditioned]
+    curves, warnings = [], [*setup_warnings(dataset), *centres.warnings(), *conditioned]
     configurations = list(dict.fromkeys(t.configuration for t in dataset.trials))
     for k, configuration in enumerate(configurations):
         tell(f"passive moments of {configuration}", k / len(configurations))
@@ -510,7 +510,7 @@ def _shifts(
     if there.any():
         force = None if moments.force is None else moments.force[there]
         declared = uncertainty.sensitivity(model, moments.q[there], force, deviations)
-        placed = uncertainty.placements(model, moments.q[there], force, centres.unknown(model, moments.q[there]), spring)
+        placed = uncertainty.placements(model, moments.q[there], force, centres.unknown(model, moments.q[there], moments.qd[there]), spring)
         values[:, there] = np.concatenate([declared[:, :, joint], placed])
     rising, falling = (np.array([_binned(moments, row, joint, sign, edges) for row in values]) for sign in (1, -1))
     return rising, falling

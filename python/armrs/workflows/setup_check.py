@@ -47,7 +47,7 @@ _OTHER_WEIGHT, _MUCH_HEAVIER = 2.0, 0.1
 within both (factors 0.85 to 1.10)."""
 _FEW = 3
 """Movements from which on their differences, and not those of trials, are the scatter of the weight."""
-_UNITS = {"lbf": 4.4482216, "kgf": 9.80665}
+_UNITS = {"lbf": 4.4482216, "kgf": 9.80665, "kN": 1000.0}
 """Other units of force [N]."""
 _SAME_UNIT = 0.3
 """A factor this close to that of a unit suggests it: literature and springs are wrong by as much."""
@@ -74,6 +74,12 @@ def examine_setup(dataset: Dataset) -> list[str]:
     model, trials = dataset.model, balanced_trials(dataset)
     motion = None if model.gravity == 0.0 or dataset.added else _motion(trials)
     return [] if motion is None else _unproved(model, motion, met=hand_meets_handle(dataset))
+
+
+def setup_warnings(dataset: Dataset) -> list[str]:
+    """Return what contradicts the columns and the masses of a data set, a line each, for verbs that do not refuse it."""
+    wrong, weight = find_wrong_setup(dataset), other_weight(dataset)
+    return [str(found) for found in (wrong, weight) if found is not None]
 
 
 def find_wrong_setup(dataset: Dataset) -> BadInput | None:

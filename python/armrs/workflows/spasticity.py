@@ -11,14 +11,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .. import _armrs, checks
-from ..analysis import joint_centres, stretch_reflex
+from ..analysis import joint_centres, passivity_checks, stretch_reflex
 from ..analysis.motion_direction import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
 from ..analysis.stretch_reflex import Reflex, Stretch
 from ..analysis.uncertainty import Deviations, sensitivity
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset, load_dataset
-from ..io.muscle_activity import co_contraction, onset
+from ..io.muscle_activity import antagonists, co_contraction, onset
 from ..io.plausibility import refuse_implausible
 from ..io.trial import Trial
 from ..model import Model
@@ -26,6 +26,7 @@ from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
 from .identify import Estimate
 from .passive import TrialMoments, trial_moments
+from .setup_check import setup_warnings
 
 DEFAULT_CUTOFF = 4.0
 """Cutoff of the low-pass [Hz]: above it, inertia times the noise of angles would be taken for latency (0.05° gave 6 ms at 8 Hz)."""
@@ -41,6 +42,9 @@ LEAST_SPEEDS = 1.5
 """The fastest stretch must be faster than the slowest by this factor before a reflex can be distinguished from viscosity."""
 CATCH_SHARE = 0.1
 """Share of its largest moment in a stretch from which on the reflex counts as begun: the catch."""
+
+SWAPPED_SHARE, FEWEST_SWAPPED = 0.3, 3
+"""Stretches with at least this share of the largest reflex show which muscle is active in it; and how many of them must contradict."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,8 @@ class MeasuredStretch:
         Time from the speed's passing the threshold to that activity [s]; NaN as above.
     co_contraction : float
         Co-contraction of antagonists, 0 to 1; NaN where no pair of them is recorded, see `armrs.io.muscle_activity`.
+    active : tuple of str
+        Channels of muscles that became active, the first first.
     """
 
     file: str
@@ -79,6 +85,7 @@ class MeasuredStretch:
     emg_onset: float
     emg_latency: float
     co_contraction: float
+    active: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +149,7 @@ class Spasticity(Tabular):
     def tidy(self) -> Tidy:
         """Return the stretches, one a row."""
         rows = [(j.joint, s) for j in self.joints for s in j.stretches]
-        names = list(MeasuredStretch.__dataclass_fields__)
+        names = [name for name in MeasuredStretch.__dataclass_fields__ if name != "active"]
         columns: dict[str, list[Any]] = {"joint": [joint for joint, _ in rows]}
         units = dict.fromkeys(("peak_moment", "elastic", "resisting", "reflex"), "N m")
         units |= {"speed": "rad/s", "work": "J", "catch_angle": "rad", "catch_speed": "rad/s", "emg_onset": "s", "emg_latency": "s"}
@@ -221,7 +228,7 @@ def spasticity(
     whole = [dataclasses.replace(trial, valid=np.empty(0, dtype=bool)) for trial in dataset.trials]
     # Torques of the contact are products of forces with angles: the low-pass comes after them.
     moments = [_moments(dataset, trial, cutoff) for trial in whole]
-    found, warnings = [], []
+    found, warnings = [], [*setup_warnings(dataset), *centres.warnings()]
     for joint in range(dataset.model.n_joints):
         tell(f"reflexes of the {dataset.model.joints[joint].name}", joint / dataset.model.n_joints)
         own = [(m, s) for m, fine in moments if (s := _stretch((dataset, centres), m, joint, cutoff, fine)) is not None]
@@ -234,6 +241,7 @@ def spasticity(
         seen = [_measured_stretch(m, s, fitted, k, dataset) for k, (m, s) in enumerate(own)]
         found.append(JointReflex(joint + 1, fitted, tuple(sorted(seen, key=lambda s: s.speed))))
         warnings += _doubts(dataset.model.joints[joint].name, fitted, max(speeds))
+        warnings += _swapped(dataset, found[-1])
     if not found:
         need = f"{stretch_reflex.FEWEST} trials that stretch one joint, the fastest {LEAST_SPEEDS:g} times as fast as the slowest"
         hint = "armrs plan MODEL --angles-deg … --spasticity JOINT -o plan proposes stretches at five speeds: record the slow ones as well"
@@ -265,6 +273,7 @@ def _stretch(
     q, qd, qdd = (values[:, 0] for values in _armrs.smooth(np.ascontiguousarray(moments.trial.q[there, joint, None]), rate, cutoff))
     every = max(1, int(rate / (FINEST * cutoff)))
     moment = low_pass(rate, cutoff)(moments.moment[there, joint])
+    passivity_checks.refuse_absurd(dataset, [(moments.trial, moment)])
     t, q, qd, qdd, moment, fine_q, fine_qd = (values[::every] for values in (t, q, qd, qdd, moment, fine_q, fine_qd))
     force = None if moments.force is None else moments.force[there][::every]
     model, smooth = dataset.model_of(moments.trial.configuration), low_pass(rate / every, cutoff)
@@ -273,7 +282,7 @@ def _stretch(
     # As `Deviations.vector` orders them; lengths and angles are those of the joint centres.
     n = dataset.model.n_joints
     shared = np.array([smooth(e) for e in (*errors[: 2 * n], *errors[4 * n :])])
-    turned, longer = centres.unknown(model, motion)
+    turned, longer = centres.unknown(model, motion, moments.qd[there][::every])
     still = _moment(model, t, motion, force)[:, joint]
     moved = [_moment(joint_centres.lengthened(model, a), t, motion + e, force)[:, joint] for e, a in zip(turned, longer, strict=True)]
     placed, misread = np.array([smooth(seen - still) for seen in moved]).reshape(-1, len(t)), turned[:, :, joint]
@@ -309,15 +318,18 @@ def _measured_stretch(moments: TrialMoments, stretch: Stretch, fitted: Reflex, n
     shape = fitted.parameters
     begun = first + int(np.argmax(felt)) if fitted.found and felt.any() else None
     span_s = float(stretch.t[first]), float(stretch.t[last])
-    emg = min(
-        (t for name in moments.trial.emg if (t := onset(moments.trial, name, *span_s)) is not None),
-        default=np.nan,
-    )
     place = [t.file for t in session.trials].index(moments.trial.file)
     both = co_contraction(session.trials, place, *span_s, session.muscles)
     # The slow low-pass widens a stretch, and with it the time for which it is beyond the threshold.
     over = fitted.direction * stretch.fine_qd[span] > shape["threshold"].value
     passed = float(stretch.t[first + int(np.argmax(over))]) if over.any() else np.nan
+    # A stretch is recorded from its start on where it follows no rest: muscles rest up to the threshold then.
+    onsets = {
+        name: t
+        for name in moments.trial.emg
+        if (t := onset(moments.trial, name, *span_s, quiet=passed if over.any() else None)) is not None
+    }
+    emg = min(onsets.values(), default=np.nan)
     return MeasuredStretch(
         file=moments.trial.file,
         configuration=moments.trial.configuration,
@@ -332,6 +344,7 @@ def _measured_stretch(moments: TrialMoments, stretch: Stretch, fitted: Reflex, n
         emg_onset=float(emg - stretch.t[first]),
         emg_latency=float(emg - passed),
         co_contraction=np.nan if both is None else both,
+        active=tuple(sorted(onsets, key=lambda name: onsets[name])),
     )
 
 
@@ -345,4 +358,22 @@ def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
         said.append(f"{name}: the reflex acts at any speed, which is as well a viscosity in one direction")
     if latency.interval[1] > 0.95 * stretch_reflex.LONGEST:
         said.append(f"{name}: the latency is not told, up to {stretch_reflex.LONGEST:g} s")
+    return said
+
+
+def _swapped(dataset: Dataset, joint: JointReflex) -> list[str]:
+    """Return which channels of antagonists are probably swapped: at reflexes the other one is active, and the stretched muscle never."""
+    name = dataset.model.joints[joint.joint - 1].name
+    largest = max((s.reflex for s in joint.stretches), default=0.0)
+    caught = [s for s in joint.stretches if joint.reflex.found and s.reflex > SWAPPED_SHARE * largest]
+    said = []
+    for pair in antagonists(sorted({channel for trial in dataset.trials for channel in trial.emg if name in channel})):
+        # Growing angles are flexion: they stretch the extensor.
+        stretched, other = pair[::-1] if joint.reflex.direction > 0 else pair
+        first = [next((c for c in s.active if c in pair), None) for s in caught]
+        if first.count(other) >= FEWEST_SWAPPED and not any(stretched in s.active for s in caught):
+            said.append(
+                f"{name}: in {first.count(other)} of {len(caught)} stretches with a reflex {other} becomes active, and {stretched}, the "
+                "muscle that is stretched, in none: are these channels swapped?"
+            )
     return said
