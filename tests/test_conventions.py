@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from armrs.errors import BadInput
-from armrs.io.plausibility import hand_meets_handle, refuse_implausible
+from armrs.io.plausibility import hand_meets_handle, mean_gap, refuse_implausible
 from armrs.model import Joint, Model, Robot, Segment
 
 LENGTHS = (0.30, 0.25, 0.08)
@@ -19,10 +19,13 @@ SEGMENTS = tuple(Segment(f"segment {k}", length, 1.0, length / 2, 0.01) for k, l
 MODEL = Model(SEGMENTS, tuple(Joint(f"joint {k}") for k in range(3)), robot=ROBOT)
 
 
-def arm(change: Callable[[np.ndarray], np.ndarray]) -> Any:
-    """Return a data set of one trial whose angles are changed, and whose robot holds the hand of those unchanged."""
+def arm(change: Callable[[np.ndarray], np.ndarray], wrist: tuple[float, float] = (0.1, 0.2)) -> Any:
+    """Return a data set of one trial whose angles are changed, and whose robot holds the hand of those unchanged.
+
+    The wrist swings about its first angle [rad] by the second.
+    """
     t = np.linspace(0.0, 6.0, 300)
-    q = np.column_stack([-1.2 + 0.3 * np.sin(t), 1.0 + 0.4 * np.sin(1.3 * t), 0.1 + 0.2 * np.sin(0.7 * t)])
+    q = np.column_stack([-1.2 + 0.3 * np.sin(t), 1.0 + 0.4 * np.sin(1.3 * t), wrist[0] + wrist[1] * np.sin(0.7 * t)])
     absolute = np.cumsum(q, axis=1)
     hand = np.column_stack([np.cos(absolute) @ LENGTHS, np.sin(absolute) @ LENGTHS]) - ROBOT.base
     near, far = ROBOT.lengths
@@ -55,3 +58,13 @@ def test_another_convention_is_named(change: Callable[[np.ndarray], np.ndarray],
     assert not hand_meets_handle(data)
     with pytest.raises(BadInput, match=says):
         refuse_implausible(data)
+
+
+def test_a_poor_zero_of_the_elbow_is_no_mirrored_wrist() -> None:
+    """With play in the handle, a mirrored wrist brought the hand as near to the handle as the elbow's zero of 6 degrees."""
+    play = 0.008 * np.sign(np.cos(np.linspace(0.0, 6.0, 300)))[:, None] * [1.0, 0.0, 0.0]
+    data = arm(lambda q: q + [0.0, 0.1, 0.0] + play, wrist=(0.2, 0.02))
+    assert 0.025 < float(np.hypot(*mean_gap(data))) < 0.04
+    refuse_implausible(data)
+    with pytest.raises(BadInput, match="column q3: .* mirrored"):
+        refuse_implausible(arm(lambda q: q * [1.0, 1.0, -1.0], wrist=(0.2, 0.02)))

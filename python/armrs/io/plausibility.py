@@ -28,6 +28,8 @@ _MEETS = 0.2
 """Another reading explains the columns when it brings hand and handle this much nearer."""
 _FOLLOWS = (0.002, 0.05)
 """The hand follows the handle where their distance changes by at most this [m], or this part of the handle's path."""
+_AS_WELL = 1.5
+"""A small error of an angle's zero is preferred to another convention that brings hand and handle at most this much nearer."""
 OTHER_ZERO = 0.2
 """A smaller error of an angle's zero [rad] may be a poor calibration, which `angle_offset` of the catalogue names."""
 _PLAINER = 0.005
@@ -79,7 +81,8 @@ def _refuse_hand_off_handle(model: Model, robot: Robot, trial: Trial) -> None:
         explained = min(_MEETS * own, 0.1 * reach, _follows(handle) if dead else np.inf)
         best, reading = _other_reading(model, robot, q, robot_q, base)
         left, zero = (np.inf, None) if dead else _other_zero(model, q, handle)
-        if best >= explained or left < _MEETS * best:  # in one posture, another convention may come near
+        small = zero is None and left < _AS_WELL * best  # a poor calibration, not another convention
+        if best >= explained or left < _MEETS * best or small:  # in one posture, another convention may come near
             best, reading = left, zero
         if reading is not None and best < explained:
             found = Text(f"angles that put the hand {own:.3g} m from the robot's handle")
