@@ -62,9 +62,10 @@ def test_another_convention_is_named(change: Callable[[np.ndarray], np.ndarray],
 
 def test_a_poor_zero_of_the_elbow_is_no_mirrored_wrist() -> None:
     """With play in the handle, a mirrored wrist brought the hand as near to the handle as the elbow's zero of 6 degrees."""
-    play = 0.008 * np.sign(np.cos(np.linspace(0.0, 6.0, 300)))[:, None] * [1.0, 0.0, 0.0]
-    data = arm(lambda q: q + [0.0, 0.1, 0.0] + play, wrist=(0.2, 0.02))
+    play = 0.008 * np.sign(np.cos(np.linspace(0.0, 6.0, 300)))
+    wrong = np.column_stack([play, np.full(300, 0.1), np.zeros(300)])
+    data = arm(lambda q: q + wrong, wrist=(0.2, 0.02))
     assert 0.025 < float(np.hypot(*mean_gap(data))) < 0.04
     refuse_implausible(data)
-    with pytest.raises(BadInput, match="column q3: .* mirrored"):
+    with pytest.raises(BadInput, match=r"column q3: .* mirrored"):
         refuse_implausible(arm(lambda q: q * [1.0, 1.0, -1.0], wrist=(0.2, 0.02)))
