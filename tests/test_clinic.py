@@ -104,8 +104,8 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
     text = clinic_page.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html").read_text(encoding="utf-8")
     assert text.count("Stiffness [N m per 10°]") == 1 and ">0.314<" in text
     assert (
-        "The table has the values of armrs identify. The page of gap fits only what the recordings ask for, together with everything else "
-        "that it found, and states shoulder, stiffness 0.436 (0.419 to 0.454)."
+        "The table has the values of armrs identify. The page of gap fits only the laws that the recordings require, together with all "
+        "other effects found, and states shoulder, stiffness 0.436 (0.419 to 0.454)."
     ) in text
     assert "shoulder: stiffness differs between the analyses by more than the uncertainty of both." in text
     assert "resting angle differs" not in text
@@ -195,7 +195,7 @@ def test_what_next_is_made_of_the_figures_of_the_result() -> None:
     found["data"] |= {"warnings": ["slow_1: joint 1 has missing samples"]}
     lines = clinic_lines.lines_of(found)
     said = clinic_next.next_steps([found], lines)
-    assert said[0] == "Mend before the next session: slow_1: shoulder has missing samples."
+    assert said[0] == "Correct before the next session: slow_1: shoulder has missing samples."
     assert said[1].startswith("shoulder, stiffness: about 8 repeats of each movement instead of 5 would make a change of this size certain")
     assert said[2] == "Measure the right arm in the same way, into the same history: the page then compares both arms."
     stretches = [{"joint": 2, "configuration": f"v{k}", "speed": 0.3 * k} for k in (1, 2, 3)]
@@ -227,7 +227,7 @@ def test_what_is_unusual_is_said_in_words(norms: tuple[clinic_norms.Norm, ...]) 
     left = [{"verb": "gap", "verdict": verdict} for verdict in ("explained", "unexplained")]
     assert clinic_page.unusual([], left[:1]) == []
     assert clinic_page.unusual([], left) == [
-        "Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it."
+        "An effect acts on the arm that the analysis could not identify: the numbers of this page may contain part of it."
     ]
     assert len(clinic_page.notes([result(warnings=list("abcdef"))])) == clinic_page.MOST_NOTES + 1
     assert clinic_page.notes([result(warnings=["slow: joint 2 moved"])]) == ["slow: elbow moved"]

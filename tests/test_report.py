@@ -72,7 +72,7 @@ def test_the_identification_in_words(results: Path) -> None:
     for part in (
         "Synthetic data: simulated, not measured", "(first table). Of the", "The movements determine ", " independent combinations of the segment", "Decided by data: determined by the measurement.", "Decided by prior: determined by the model as given",
         "What cannot be distinguished", "Calibration of the sensors", "What is left", "How to repeat", "armrs identify", "--with coulomb", f"{_armrs.build_profile} build",
-        "3 fit trials: ", "1 test trial, which no fit has seen: ", "kg m²",
+        "3 fit trials: ", "1 test trial, not used in any fit: ", "kg m²",
     ):  # fmt: skip
         assert part in text, part
 

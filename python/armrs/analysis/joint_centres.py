@@ -86,8 +86,8 @@ class JointCentres:
         if self.causes:
             said += f"; explained by {' or by '.join(map(str, self.causes))}"
         if self.found:
-            return (f"{said}: corrected there, angles of the arm are used as measured",)
-        return (f"{said}: no joint centres are taken from the robot, and intervals allow for such errors of the arm's angles",)
+            return (f"{said}: the path of the robot is corrected, angles of the arm are used as measured",)
+        return (f"{said}: joint centres are those of the markers, and intervals allow for such errors of the arm's angles",)
 
     def lines(self, model: Model) -> tuple[str, ...]:
         """Return where the joints were found, for the segments of the data set; nothing where no robot shows them."""

@@ -84,7 +84,7 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
 def slow_enough(shares: Sequence[tuple[str, int, float]]) -> Check:
     """Check inertial torques: configuration, joint (from 1) and root mean square relative to the passive moment."""
     if not shares:
-        return Check("slow", None, "No joint moved far enough to tell.")
+        return Check("slow", None, "No joint moved far enough to check this.")
     configuration, joint, share = max(shares, key=lambda item: item[2])
     found = f"inertial torques are at most {100 * share:.2g} % of the passive moment"
     where = f"(joint {joint}, {configuration}; allowed {100 * SLOW:.0f} %)"
@@ -111,8 +111,8 @@ def gives_energy(half_widths: Sequence[tuple[str, int, tuple[float, float]]]) ->
         return []
     joints = ", ".join(wrong)
     return [
-        f"half width of the hysteresis below zero: {joints}: a relaxed joint gives no energy. Are angles or forces in another unit or "
-        "direction, or late against each other, or were muscles active?"
+        f"half width of the hysteresis below zero: {joints}: a relaxed joint cannot generate energy. Are angles or forces in another unit "
+        "or direction, or delayed against each other, or were muscles active?"
     ]
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 HistoryFile = Annotated[
     Path | None,
-    typer.Option("--history", metavar="FILE", help="Add the result to the history of this subject, a file of SQLite, and show it."),
+    typer.Option("--history", metavar="FILE", help="Add the result to the history of this subject, an SQLite file, and show it."),
 ]
 SessionDate = Annotated[
     str | None,

@@ -24,7 +24,7 @@ def demo(context: typer.Context, out: OutFolder = Path("armrs-demo"), json: Json
 
 
 def reproduce(context: typer.Context, out: OutFolder = Path("armrs-thesis"), json: JsonFile = None) -> None:
-    """Compute every table and figure of the thesis that a machine can: what is printed, what comes out, and why they differ.
+    """Recompute every table and figure of the thesis that can be recomputed: printed value, result, and why they differ.
 
     Takes about 40 seconds of one core; what is being computed is shown.
     """

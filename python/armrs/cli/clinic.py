@@ -25,7 +25,7 @@ def spasticity(
 ) -> int:
     """Find the stretch reflex of joints that were stretched at several speeds: threshold, gain and latency with intervals.
 
-    Peak moment and work against speed, the catch, and the onset of muscle activity where it was recorded; elastic, viscous and dry
+    Also reports peak moment and work against speed, the catch, and the onset of recorded muscle activity; elastic, viscous and dry
     resistance are separated from the reflex. armrs plan --spasticity proposes the stretches.
 
     Exit status 1 when no joint shows a reflex.
@@ -65,8 +65,8 @@ def cohort(
     """Summarise many subjects: mean, scatter between and within subjects, groups and sides compared, norm bands with their uncertainty.
 
     A table has the columns subject, quantity, value, and optionally unit, std, group, side (left or right), date. Cells are between commas,
-    semicolons or tabs. Of data sets in a folder passive moments are computed. Below -o, cohort.csv is the tidy table, one value a row, and
-    norms.toml has the norm bands for armrs report --summary --norms, a file for each group.
+    semicolons, tabs or bars. For data sets in a folder, passive moments are computed. Below -o, cohort.csv is the tidy table, one value per
+    row, and norms.toml has the norm bands for armrs report --summary --norms, one file for each group.
 
     Exit status 1 when something was left out.
     """

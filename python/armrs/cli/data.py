@@ -34,7 +34,7 @@ _MODEL_SUFFIX = {"urdf": ".urdf", "mjcf": ".xml", "osim": ".osim", "toml": ".tom
 
 
 def effects(
-    kind: Annotated[str | None, typer.Argument(metavar="KIND", help="Only this kind.")] = None,
+    kind: Annotated[str | None, typer.Argument(metavar="KIND", help="Print only this kind.")] = None,
     json: JsonFile = None,
 ) -> None:
     """Print the catalogue of effects: where each acts, its formula, its parameters with units and bounds."""
@@ -77,9 +77,7 @@ def convert(
     ],
     out: OutFolder,
     to: Annotated[TableFormat, typer.Option("--to", help="Format to write.")] = TableFormat.parquet,
-    points: Annotated[
-        str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the point half way.")
-    ] = "",
+    points: Annotated[str, typer.Option(metavar="A,B+C,…", help="Markers of the joints, first joint to handle; B+C is the midpoint.")] = "",
     up: Annotated[
         str | None, typer.Option(metavar="AXIS", help="Axis of the markers that points up: z in C3D, y in TRC when absent.")
     ] = None,
@@ -90,7 +88,7 @@ def convert(
     force: Annotated[bool, typer.Option("--force", help="Replace a model file that exists.")] = False,
     json: JsonFile = None,
 ) -> None:
-    """Convert between file formats, every value kept to the bit; turn marker trajectories into joint angles and segment lengths."""
+    """Convert between file formats, every value bit-identical; turn marker trajectories into joint angles and segment lengths."""
     from ..io import motion_files
     from ..io.markers import MARKER_SUFFIXES
     from ..io.opensim import MOTION_SUFFIXES
@@ -162,7 +160,7 @@ def report(
 ) -> None:
     """Make one self-contained HTML report, report.html, of any results.
 
-    With --summary one page in plain words: stiffness, resistance and friction of each joint from results of identify and passive.
+    With --summary one page in plain words for a clinician, from results of identify, gap, passive and spasticity of one session.
     """
     if norms is not None and not summary:
         raise BadInput("--norms", Text("no --summary"), "--norms beside --summary")

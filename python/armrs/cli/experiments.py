@@ -40,7 +40,7 @@ class Coupling(str, enum.Enum):
     rigid = "rigid"
 
 
-Step = Annotated[float | None, typer.Option(help="Step [s], above 0; when absent 0.00025, or shorter where steep dry friction needs it.")]
+Step = Annotated[float | None, typer.Option(help="Step [s], above 0; when absent 0.00025, or shorter if steep dry friction requires it.")]
 Accuracy = Annotated[
     float | None,
     typer.Option(help="Largest error of an angle [rad], instead of a step: a step that keeps it is found by comparing runs."),
@@ -59,14 +59,14 @@ def simulate(
     ] = None,
     trial: DrivingTrial = None,
     out: MaybeFolder = None,
-    engine: Annotated[Engine, typer.Option(help="Minimal coordinates, or rigid bodies and joints.")] = Engine.native,
+    engine: Annotated[Engine, typer.Option(help="native: minimal coordinates; rapier: rigid bodies and joints.")] = Engine.native,
     dt: Step = None,
     accuracy_rad: Accuracy = None,
     rate_hz: Annotated[
-        float, typer.Option(help="Samples a second that are recorded [Hz], 0.001 or more; a whole number of steps from one to the next.")
+        float, typer.Option(help="Recorded samples per second [Hz], 0.001 or more; the interval is a whole number of steps.")
     ] = 50.0,
     integrator: Annotated[
-        Integrator | None, typer.Option(help="Of the native engine: of fourth order (when absent), or semi-implicit of first order.")
+        Integrator | None, typer.Option(help="Of the native engine: fourth order (when absent), or semi-implicit of first order.")
     ] = None,
     coupling: Annotated[Coupling, typer.Option(help="How the handle holds the tip.")] = Coupling.compliant,
     duration_s: Annotated[
@@ -81,9 +81,9 @@ def simulate(
 ) -> int:
     """Simulate the closed-chain experiment: a robot leads the arm.
 
-    A warning when 0.1 % of the energy exchanged is not accounted for, or half the step changes angles or forces by 0.1 %; exit status 1
-    from 1 % on. Where smooth dry friction is too steep for the step, and no step was asked for, a shorter one is taken; what is still in
-    doubt is compared with half the step without being asked.
+    A warning is given if the error of the energy balance reaches 0.1 % of the exchanged energy, or if half the step changes angles or
+    forces by 0.1 %; exit status 1 from 1 % on. If smooth dry friction is too steep for the default step, a shorter one is used; a run that
+    does not resolve it is compared with a run at half the step.
     """
     from ..model import load_model
     from ..report import sentences
@@ -163,7 +163,7 @@ def plan(
     ] = None,
     json: JsonFile = None,
 ) -> int:
-    """Propose movements that make the parameters identifiable, and say before the experiment how well each will be known.
+    """Propose movements that make the parameters identifiable, and predict how well each will be known.
 
     With --spasticity: stretches of one joint from 15 °/s to as fast as the limits allow, and how well they will show threshold, gain and
     latency of its reflex; the other joints are held in the middle of their ranges.
@@ -220,7 +220,7 @@ def record(
     out: OutFolder,
     json: JsonFile = None,
 ) -> int:
-    """Run an experiment in the virtual laboratory; writes a data set, the markers, and the truth in a folder of its own.
+    """Run an experiment in the virtual laboratory; write a data set, the markers and, in a separate folder, the true values.
 
     With [sensors.six_axis], the force is made of the readings of a six-axis force sensor, which are in wrench/. Exit status 1 when the
     safety supervisor stopped a trial; that trial is not in the data set.
@@ -264,7 +264,7 @@ def sweep(
 ) -> int:
     """Simulate and identify many cases with subjects, sensors and movements drawn at random, or resamples of a data set.
 
-    Writes two Parquet tables, a row a case and a row an estimate. The same command goes on where an interrupted one stopped. Exit status
+    Writes two Parquet tables, with one row per case and per estimate. After an interruption, the same command continues. Exit status
     1 when cases failed.
 
     A SWEEP.toml; docs/files.md has every key:

@@ -21,7 +21,7 @@ class Precision(str, enum.Enum):
 def export_c(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="model.toml, such as identified.toml")],
     out: OutFolder,
-    precision: Annotated[Precision, typer.Option(help="Of the library that the firmware links.")] = Precision.double,
+    precision: Annotated[Precision, typer.Option(help="Precision of the library that the firmware links.")] = Precision.double,
     identified: Annotated[
         Path | None, typer.Option("--identified", metavar="FILE", help="JSON of armrs identify, for the covariance.")
     ] = None,

@@ -219,7 +219,7 @@ def import_(
     ] = "",
     rate_hz: Annotated[float | None, typer.Option(help="Sample rate of recordings without a column of time [Hz].")] = None,
     ask: Annotated[bool, typer.Option("--ask", help="Ask for each column on the terminal, with a guess and its reason.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace the data set of a former import, with what was edited in it.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the data set of a former import, including your edits.")] = False,
     json: JsonFile = None,
 ) -> int:
     """Convert recordings (CSV, Excel, Parquet, MATLAB, C3D, TRC, MOT, STO, exports of Vicon, Qualisys, OptiTrack) into a data set.

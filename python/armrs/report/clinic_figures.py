@@ -75,7 +75,11 @@ def _stretches(result: Spasticity, found: JointReflex, name: str) -> Drawn:
     left.legend(fontsize="small")
     caught = [s for s in found.stretches if np.isfinite(s.catch_angle)]
     right.plot(
-        [degrees * s.catch_angle for s in caught], [degrees * s.catch_speed for s in caught], "o", color=plotting.RED, label="reflex felt"
+        [degrees * s.catch_angle for s in caught],
+        [degrees * s.catch_speed for s in caught],
+        "o",
+        color=plotting.RED,
+        label="onset of the reflex",
     )
     if found.reflex.found:
         threshold = found.reflex.parameters["threshold"]
@@ -86,9 +90,9 @@ def _stretches(result: Spasticity, found: JointReflex, name: str) -> Drawn:
     if right.get_legend_handles_labels()[0]:
         right.legend(fontsize="small")
     text = (
-        "One point a stretch. Left: its largest moment, and the largest of each part of the fitted law. Right: angle and speed "
-        "where the reflex is first felt, at a tenth of its largest moment. The line is the speed from which on it acts, grey its interval. "
-        "A latency moves the points off the line: the speed changes before the reflex is felt."
+        "One point per stretch. Left: its largest moment, and the largest of each part of the fitted law. Right: angle and speed "
+        "at the onset of the reflex, where it reaches a tenth of its largest moment. The line is the threshold of the reflex, grey its "
+        "interval. With a latency, points lie off the line, because the speed changes before the reflex acts."
     )
     return Drawn(f"stretches-{found.joint}", f"Stretches of {name}", text, figure)
 
@@ -118,7 +122,7 @@ def _cohort(result: Cohort) -> Drawn:
         ax.grid(visible=False, axis="x")
     for ax in axes[len(names) :]:
         ax.remove()
-    text = "One point a session; the line is the mean, the grey band holds 95 of 100 sessions of other subjects of the group and side."
+    text = "One point per session; the line is the mean, the grey band holds 95 of 100 sessions of other subjects of the group and side."
     return Drawn("cohort", "The cohort", text, figure)
 
 

@@ -27,7 +27,7 @@ def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> l
     if any(line.before is not None and line.before.clear for line in lines):
         said.append("Repeat the session within days before acting on a change: strapping and posture differ from day to day.")
     if lines and not any(result.get("session") or result.get("history") for result in results):
-        said.append("Keep the sessions of this person in one file (--history FILE): the next page then says what changed.")
+        said.append("Keep the sessions of this person in one file (--history FILE): the next page then states what changed.")
     return [*said, *_other_arm(results, lines)]
 
 
@@ -39,7 +39,7 @@ def _mend(results: Sequence[Mapping[str, Any]]) -> list[str]:
     reflex = any(result["verb"] == "spasticity" and any(e["decided"] for e in result["effects"]) for result in results)
     found = [line for line in dict.fromkeys([*failed, *warned]) if not (reflex and ACTIVE in line)]
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return [f"Mend before the next session: {found[0].rstrip('.')}{more}."] if found else []
+    return [f"Correct before the next session: {found[0].rstrip('.')}{more}."] if found else []
 
 
 def _faster(results: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -53,9 +53,9 @@ def _faster(results: Sequence[Mapping[str, Any]]) -> list[str]:
             if not speeds:
                 continue
             fastest = f"{math.degrees(speeds[-1]):.0f} °/s"
-            planned = f"armrs plan … --spasticity {effect['joint']} finds the fastest stretch within the limits that it is given"
+            planned = f"armrs plan … --spasticity {effect['joint']} finds the fastest stretch within the stated limits"
             if not effect["decided"]:
-                said.append(f"{joint}: no reflex up to {fastest}. Only faster stretches can show one that begins later; {planned}.")
+                said.append(f"{joint}: no reflex up to {fastest}. Only faster stretches can show one with a higher onset; {planned}.")
                 continue
             onset = effect["parameters"]["threshold"]["value"]
             above = sum(speed > onset for speed in speeds)
@@ -92,8 +92,8 @@ def _repeats(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> lis
     ]
     if not said:
         said.append(
-            "Where no clear change is stated, a change smaller than the number behind ± could not have been seen. More repeats of each "
-            "movement make that number smaller: four times the repeats halve it."
+            "Where no clear change is stated, a change smaller than the number after ± could not be detected. More repeats of each "
+            "movement reduce that number: four times as many repeats halve it."
         )
     return said
 

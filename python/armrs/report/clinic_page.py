@@ -131,7 +131,7 @@ def compared_with(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -
         said = f"This session{f' of the {side} arm' if side else ''} is compared with {_listed(parts)}."
     later = sorted({date for session in kept for date in session.get("later", ())})
     said += f" Later sessions ({', '.join(later)}) are not compared." if later else ""
-    return said if side or not kept else f"{said} Which arm it is was not stated: sessions of left and right are not told apart."
+    return said if side or not kept else f"{said} Which arm was measured is not stated: left and right are not distinguished."
 
 
 def _listed(parts: Sequence[str]) -> str:
@@ -181,8 +181,8 @@ def estimates(lines: Sequence[Line], results: Sequence[Mapping[str, Any]]) -> st
 
 _WHY = {
     "identify": "The page of identify fits a spring, resistance to speed and friction to every joint",
-    "passive": "The page of passive reads slow movements alone",
-    "gap": "The page of gap fits only what the recordings ask for, together with everything else that it found",
+    "passive": "The page of passive uses slow movements only",
+    "gap": "The page of gap fits only the laws that the recordings require, together with all other effects found",
     "spasticity": "The page of spasticity fits a reflex beside resistance and friction",
 }
 """Why an analysis states another number than the one before it."""
@@ -231,7 +231,7 @@ def unusual(lines: Sequence[Line], results: Sequence[Mapping[str, Any]] = ()) ->
     """Return what is outside of what is usual, and whether something acts that has no name, in plain words."""
     said = []
     if any(result.get("verb") == "gap" and result.get("verdict") == "unexplained" for result in results):
-        said.append("Something acts on the arm that the analysis could not name: the numbers of this page may contain part of it.")
+        said.append("An effect acts on the arm that the analysis could not identify: the numbers of this page may contain part of it.")
     for result in results:
         if result.get("verb") == "gap":
             said += found(result)
@@ -274,7 +274,7 @@ def doubts(results: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         if any(_is_dry(e["kind"]) and e["decided_by"] == "data" and e["interval"][0] > 0.0 for e in estimates):
             yield _MOVING
         if result.get("verdict") == "unexplained":
-            yield "something acts on the arm that has no name"
+            yield "an effect acts on the arm that the analysis could not identify"
 
 
 def _is_dry(kind: str) -> bool:

@@ -51,6 +51,7 @@ PREDICTED = (
     "model lacks is in neither. Relative: ± std of the data divided by the value; a small parameter of an effect counts as 0.05."
 )
 
+NO_TEST_TRIALS = "No test trials: the result was not checked on data outside the fit."
 COUPLING_OR_MASS = (
     "Tissue that spans both joints couples them. A wrong mass or centre of mass in the model does the same, because the gravity moment "
     "depends on the sum of both angles: compare with the first moments of armrs identify."
@@ -105,7 +106,7 @@ def _identified(result: Mapping[str, Any]) -> str:
 def _simulated(result: Mapping[str, Any]) -> str:
     return (
         f"{result['duration_s']:.4g} s simulated; the force on the arm reaches {result['largest_force_N']:.4g} N. "
-        f"Energy is accounted for to {result['energy']['error_J']:.2g} J."
+        f"The error of the energy balance is {result['energy']['error_J']:.2g} J."
     )
 
 
@@ -135,7 +136,7 @@ def _coupled(result: Mapping[str, Any]) -> str:
 
 def _passive(result: Mapping[str, Any]) -> str:
     if not result["curves"]:
-        return "No joint moved far enough in both directions to tell its passive moment."
+        return "No joint moved far enough in both directions to determine its passive moment."
     parts: dict[str, list[str]] = {}
     for curve in result["curves"]:
         low, high = curve.get("half_width_interval_Nm") or (None, None)
@@ -157,7 +158,7 @@ def _followed(result: Mapping[str, Any]) -> str:
     courses = result["courses"]
     changed = [formatting.parameter_label(c) for c in courses if c["changed"]]
     said = f"{', '.join(changed)} changed in the last session" if changed else "No parameter changed in the last session"
-    return f"{len(courses)} parameters are followed. {said}, at a level of 5 % over all of them together."
+    return f"{len(courses)} parameters are tracked over the sessions. {said} (level of 5 % for all of them together)."
 
 
 def _demo(result: Mapping[str, Any]) -> str:
@@ -167,14 +168,14 @@ def _demo(result: Mapping[str, Any]) -> str:
 def data_lines(data: Mapping[str, Any]) -> list[str]:
     """Return what a result rests on."""
     lines = []
-    for role, meaning in (("fit", ""), ("test", ", which no fit has seen")):
+    for role, meaning in (("fit", ""), ("test", ", not used in any fit")):
         part = data[role]
         if part["trials"]:
             lines.append(
                 f"{formatting.how_many(part['trials'], f'{role} trial')}{meaning}: {part['duration_s']:.0f} s, {part['samples']} samples."
             )
     if not data["test"]["trials"]:
-        lines.append("No test trials: nothing was checked on data that no fit has seen.")
+        lines.append(NO_TEST_TRIALS)
     lines.append(f"Movements: {', '.join(data['configurations'])}.")
     held = [word for word, there in (("contact forces", data["forces"]), ("joint torques", data["torques"])) if there]
     lines.append(f"Measured: angles, {', '.join(held)}.")
@@ -234,7 +235,7 @@ def identified(result: Mapping[str, Any], written: Sequence[Path] = ()) -> None:
         print(f"What cannot be distinguished: {independent(result)}.")
         print("\n".join(f"  {line}" for line in lines))
     if not data["test"]["trials"]:
-        print("No test trials: nothing was checked on data that no fit has seen.")
+        print(NO_TEST_TRIALS)
     followed(result)
     files_written(written)
 
@@ -364,7 +365,7 @@ def planar(motion: PlanarMotion, points: Sequence[str], file: Path) -> None:
     plane = plain["plane"]
     print(
         f"\n{'planar' if plane['planar'] else 'not planar'}: the segments leave the plane by {plane['out_of_plane_rms_deg']:.3g}° (rms), "
-        f"{plane['out_of_plane_most_deg']:.3g}° at most; the plane leans {plane['tilt_deg']:.3g}° from the vertical"
+        f"{plane['out_of_plane_most_deg']:.3g}° at most; the plane is tilted by {plane['tilt_deg']:.3g}° from the vertical"
     )
     print(file)
 

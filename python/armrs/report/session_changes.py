@@ -11,7 +11,7 @@ from ..formatting import two_digits
 
 NO_CHANGE, PERHAPS = "no clear change", "perhaps"
 SURE = "How sure: if nothing had changed, each analysis would still report a change in 1 of 20 sessions."
-EITHER_WAY = "The number behind ± is half of a 95 % interval."
+EITHER_WAY = "The number after ± is half of a 95 % interval."
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def change_lines(
     for row, change in followed:
         if change.perhaps:
             told = change.words.partition(": ")[2]
-            many = f"but {change.compared} quantities were compared, and one of them may do that by chance"
+            many = f"but {change.compared} quantities were compared, and one of them may exceed it by chance"
             lines.append(f"Perhaps: {_named(row)} {told} {row.quantity.unit}. This is more than its ±, {many}.")
     same: dict[str, list[str]] = {}
     for row, change in followed:

@@ -252,7 +252,7 @@ def predictions(data: Mapping[str, Any]) -> Table:
             percent(p["relative"]),
         ]
         rows.append(row if other is None else [*row, percent(other["predictions"][k]["relative"])])
-    head = ["quantity", "where", "believed", "± std to expect", "± std of the data", "unit", "relative"]
+    head = ["quantity", "where", "assumed", "± std to expect", "± std of the data", "unit", "relative"]
     return Table(head if other is None else [*head, "compared"], rows, left=2, symbols=True)
 
 

@@ -193,7 +193,7 @@ def cohort(
     ----------
     source : path
         A CSV with a value a row: subject, quantity, value, and optionally unit, std, group, side (left or right), date; with commas,
-        semicolons or tabs between cells, decimal points or commas. Or a folder, searched at all
+        semicolons, tabs or bars between cells, decimal points or commas. Or a folder, searched at all
         depths: JSON results of `identify`, `passive`, `gap` and `spasticity`; where there are none, data sets, whose passive moments
         are computed.
     groups : path, optional

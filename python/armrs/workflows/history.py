@@ -48,19 +48,19 @@ _ARM = (
 _MAGIC = b"SQLite format 3\0"
 _TABLES = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
 _IMPOSSIBLE = {
-    "a number is none": (
+    "a value is invalid": (
         "SELECT count(*) FROM estimate WHERE typeof(value) NOT IN ('real', 'integer') OR typeof(std) NOT IN ('real', 'integer') "
         "OR abs(value) > 1e300 OR std < 0 OR std > 1e300"
     ),
-    "a date is none": "SELECT count(*) FROM session WHERE date IS NOT date(date)",
-    "a number of joints is none": "SELECT count(*) FROM session WHERE typeof(joints) != 'integer' OR joints < 1",
+    "a date is invalid": "SELECT count(*) FROM session WHERE date IS NOT date(date)",
+    "a number of joints is invalid": "SELECT count(*) FROM session WHERE typeof(joints) != 'integer' OR joints < 1",
 }
 """What the tables would take and armrs never writes, with a query that counts it."""
 _IMPOSSIBLE_SUBJECT = {
     "there are two subjects": "SELECT count(*) > 1 FROM subject",
     "a subject has no name": "SELECT count(*) FROM subject WHERE typeof(name) != 'text' OR name = ''",
 }
-_IMPOSSIBLE_ARM = {"a side is none": "SELECT count(*) FROM arm WHERE side NOT IN ('', 'left', 'right')"}
+_IMPOSSIBLE_ARM = {"a side is invalid": "SELECT count(*) FROM arm WHERE side NOT IN ('', 'left', 'right')"}
 _OUTPUTS = (".json", ".toml", ".html", ".png", ".csv", ".parquet")
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 _UNREADABLE = (sqlite3.Error, UnicodeDecodeError)

@@ -582,19 +582,19 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
         # Where no repeat has a direction, the movement is the cause and not a sensor, and a line on its joints states that.
         if moving and not m.direction.any():
             lines.append(
-                f"{m.trial.file}: no joint moves long enough to tell its direction: the trial is not used (wrong unit, or a dead sensor?)"
+                f"{m.trial.file}: no joint moves long enough in one direction: the trial is not used (wrong unit, or a dead sensor?)"
             )
         if m.force is None or not there.any():
             continue
         weight = _armrs.Arm.from_model(dataset.model_of(m.trial.configuration)).gravity(m.q[there])
         share = float(np.sum((m.moment + m.inertial)[there] * weight) / max(np.sum(weight**2), 1e-300)) + 1.0
         if np.mean(np.sum(weight**2, axis=1)) > LEAST_WEIGHT**2 and not CARRIED[0] <= share <= CARRIED[1]:
-            lines.append(
-                f"{m.trial.file}: the force carries {100 * share:.2g} % of the arm's weight: is it in N, and force_on the right side?"
-            )
+            lines.append(f"{m.trial.file}: the force carries {100 * share:.2g} % of the arm's weight: check the unit (N) and force_on")
     places = np.array([repeat_statistics.mean(m.q) for m in repeats])
     for j, at in enumerate(places[np.isfinite(places).all(axis=1)].T, start=1):
         if at.size and np.ptp(at) > CENTRES_APART:
-            where = f"{repeats[0].trial.configuration}: its repeats have joint {j} up to {np.degrees(np.ptp(at)):.3g}° apart"
+            where = (
+                f"{repeats[0].trial.configuration}: the mean angle of joint {j} differs by {np.degrees(np.ptp(at)):.3g}° between repeats"
+            )
             lines.append(f"{where}: another unit, swapped columns, or two configurations?")
     return lines

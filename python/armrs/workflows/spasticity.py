@@ -355,9 +355,9 @@ def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
     if not fitted.found:
         return [f"{name}: no reflex was found up to {fastest:.2g} rad/s"]
     if threshold.value < 0.02 * fastest:
-        said.append(f"{name}: the reflex acts at any speed, which is as well a viscosity in one direction")
+        said.append(f"{name}: the threshold of the reflex is close to zero: it cannot be distinguished from a viscosity in one direction")
     if latency.interval[1] > 0.95 * stretch_reflex.LONGEST:
-        said.append(f"{name}: the latency is not told, up to {stretch_reflex.LONGEST:g} s")
+        said.append(f"{name}: the latency is not determined: its interval reaches the largest value tested, {stretch_reflex.LONGEST:g} s")
     return said
 
 
@@ -374,6 +374,6 @@ def _swapped(dataset: Dataset, joint: JointReflex) -> list[str]:
         if first.count(other) >= FEWEST_SWAPPED and not any(stretched in s.active for s in caught):
             said.append(
                 f"{name}: in {first.count(other)} of {len(caught)} stretches with a reflex {other} becomes active, and {stretched}, the "
-                "muscle that is stretched, in none: are these channels swapped?"
+                "stretched muscle, in none: are these channels swapped?"
             )
     return said

@@ -67,7 +67,7 @@ def _few_trials(dataset: Dataset, led: bool) -> list[str]:
             "no movement was repeated: what is noise and what is missing cannot be distinguished; names after the first are guesses"
         )
     if not dataset.test_trials:
-        lines.append('no trial with role = "test": the gap cannot be measured on data that no fit has seen')
+        lines.append('no trial with role = "test": the gap cannot be measured on data outside the fit')
     return lines
 
 
