@@ -243,10 +243,10 @@ def record(
     apart = "" if any(run.tests for run in planned.runs) else "; tests = 1 in [[movement]] records a test trial, which no fit uses"
     worn = ", ".join(run.configuration for run in planned.runs if run.worn)
     alike = f"remove [[added]] and the trials of {worn} from {quoted(out / 'dataset.toml')}, then " if worn else ""
-    step = f"{alike}armrs gap {quoted(out)} -o gap{apart}"
+    following = f"{alike}armrs gap {quoted(out)} -o gap{apart}"
     if stretched_joint(result.dataset.trials) is not None:
-        step = f"{alike}armrs check {quoted(out)}, then armrs spasticity {quoted(out)} -o spasticity"
-    present(lambda: plain, json, lambda: sentences.recorded(plain, report), step)
+        following = f"{alike}armrs check {quoted(out)}, then armrs spasticity {quoted(out)} -o spasticity"
+    present(lambda: plain, json, lambda: sentences.recorded(plain, report), following)
     return 1 if result.stopped else 0
 
 

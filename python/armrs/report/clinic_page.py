@@ -143,7 +143,7 @@ def answers(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list
     """Return what changed since the session before and since the first, and what differs from the other arm, each under its heading."""
     side = next(filter(None, map(_side, results)), None)
     other = f"{arm_side.other(side)} arm" if side else "other arm"
-    said = []
+    said: list[tuple[str, list[str]]] = []
     for attribute, head, what, than in (
         ("before", "What changed since", "change", ""),
         ("first", "Since the first session,", "change", ""),

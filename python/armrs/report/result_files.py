@@ -21,7 +21,7 @@ from . import dataset_pages, figures, interactive, pages, plotting, run_animatio
 from .view import View
 
 if TYPE_CHECKING:
-    from ..workflows.history import History
+    from ..workflows.courses import History
 
 
 def history_data(result: History) -> dict[str, Any]:
