@@ -1,6 +1,6 @@
 //! Descriptions of data sets: what is accepted, what is refused and in which words, and that writing loses nothing.
 
-use arm_model::{Description, ForceOn, Role, Sex, Tolerance};
+use arm_model::{Description, ForceOn, Role, Sex, Side, Tolerance};
 
 const DATASET: &str = r#"name = "S1"
 model = "model.toml"
@@ -11,6 +11,7 @@ sample_rate = 50.0
 body_mass = 77.0
 height = 1.8
 sex = "male"
+side = "left"
 
 [tolerance]
 force_bias_N = 0.4
@@ -42,8 +43,8 @@ fn every_key_is_read_and_written() {
         (Some("S1"), Some(ForceOn::Robot))
     );
     assert_eq!(
-        (data.subject.height, data.subject.sex),
-        (Some(1.8), Some(Sex::Male))
+        (data.subject.height, data.subject.sex, data.subject.side),
+        (Some(1.8), Some(Sex::Male), Some(Side::Left))
     );
     let expected = Tolerance {
         force_bias: 0.4,
@@ -104,7 +105,7 @@ const BROKEN: &[(&str, &str, &str)] = &[
     (
         "height",
         "hight",
-        "[subject]: found unknown key 'hight', allowed body_mass, height, lengths_m, name, sex (nearest known: height)",
+        "[subject]: found unknown key 'hight', allowed body_mass, height, lengths_m, name, sex, side (nearest known: height)",
     ),
     (
         "force_bias_N",
@@ -160,6 +161,11 @@ const BROKEN: &[(&str, &str, &str)] = &[
         "\"male\"",
         "\"m\"",
         "[subject], sex: found 'm', allowed \"male\" or \"female\"",
+    ),
+    (
+        "\"left\"",
+        "\"links\"",
+        "[subject], side: found 'links', allowed \"left\" or \"right\"",
     ),
     (
         "= 0.4",
