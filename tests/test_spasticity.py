@@ -57,6 +57,26 @@ def test_without_a_reflex_none_is_found() -> None:
     assert not any(e.kind == "stretch_reflex" for e in found.followed())
 
 
+def test_a_law_that_drives_the_joint_is_no_reflex() -> None:
+    """A shoulder that moved by two degrees beside a stretched elbow had a reflex from 0 rad/s on, with a viscosity of -1.1 N m s/rad."""
+    data = patients.session(Patient(), SEED)
+    driven = [
+        dataclasses.replace(trial, tau=trial.tau - 2.0 * np.gradient(trial.q[:, 0], trial.t)[:, None])  # type: ignore[operator]
+        for trial in data.trials
+    ]
+    found = armrs.spasticity(data.replace(trials=tuple(driven)))
+    assert found.joints[0].reflex.viscosity.interval[1] < 0.0 and not found.joints[0].reflex.found
+    assert "no reflex was found" in found.warnings[0] and "no passive joint drives itself" in found.warnings[0]
+
+
+def test_a_joint_that_moves_with_a_stretched_one_is_not_stretched() -> None:
+    data = patients.session(Patient(), SEED)
+    middle = np.mean(np.concatenate([trial.q for trial in data.trials]))
+    nearly_held = [dataclasses.replace(trial, q=middle + 0.05 * (trial.q - middle)) for trial in data.trials]
+    with pytest.raises(BadInput, match="no joint that is stretched"):
+        armrs.spasticity(data.replace(trials=tuple(nearly_held)))
+
+
 def test_an_angle_threshold_is_told() -> None:
     patient = dataclasses.replace(Patient(), threshold=0.3, tonic=np.radians(90.0), slope=2.0)
     found = armrs.spasticity(patients.session(patient, SEED)).joints[0].reflex

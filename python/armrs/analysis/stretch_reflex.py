@@ -154,7 +154,8 @@ class Reflex:
     viscosity, dry : Estimated
         Besides the reflex [N m s/rad, N m].
     found : bool
-        Whether there is a reflex: its gain is above zero in the interval.
+        Whether there is a reflex: its gain is above zero in the interval, and viscosity and dry friction beside it are not below it, as no
+        passive joint drives itself.
     elastic, resisting, reflex : tuple of ndarray
         Elastic, viscous and dry, and reflex moment of every trial [N m].
     residual_rms : float
@@ -353,7 +354,7 @@ class _Problem:
             parameters=dict(zip(names[: 1 + free], numbers[: 1 + free], strict=True)),
             viscosity=numbers[5],
             dry=numbers[6],
-            found=bool(values[0] - half[0] > 0.0),
+            found=bool(values[0] - half[0] > 0.0 and min(numbers[5].interval[1], numbers[6].interval[1]) > 0.0),
             elastic=tuple(_from_start(c[:, :ELASTIC] @ linear[:ELASTIC]) for c, _ in told),
             resisting=tuple(_from_start(c[:, ELASTIC : ELASTIC + 2] @ linear[ELASTIC : ELASTIC + 2]) for c, _ in told),
             reflex=tuple(_from_start(late) for _, late in told),

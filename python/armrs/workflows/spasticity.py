@@ -12,7 +12,6 @@ import numpy as np
 
 from .. import _armrs, checks
 from ..analysis import joint_centres, passivity_checks, stretch_reflex
-from ..analysis.motion_direction import LEAST_RANGE
 from ..analysis.robot_motion import with_robot_motion
 from ..analysis.stretch_reflex import Reflex, Stretch
 from ..analysis.uncertainty import Deviations, sensitivity
@@ -38,6 +37,8 @@ FINEST = 25.0
 """Samples in each period of the cutoff, enough for the finer motion."""
 EDGE = 1.0
 """Periods of the cutoff at both ends of a trial that are not fitted: the low-pass has one side of them only."""
+LEAST_STRETCH = np.radians(10.0)
+"""A joint that moves less is not stretched, but moves with another [rad]; planned stretches have 20° and more."""
 LEAST_SPEEDS = 1.5
 """The fastest stretch must be faster than the slowest by this factor before a reflex can be distinguished from viscosity."""
 CATCH_SHARE = 0.1
@@ -267,7 +268,7 @@ def _stretch(
     if there.size < 3 or there[-1] - there[0] + 1 != there.size:
         return None
     t, fine_q, fine_qd = moments.trial.t[there], moments.q[there, joint], moments.qd[there, joint]
-    if np.ptp(fine_q) < LEAST_RANGE:
+    if np.ptp(fine_q) < LEAST_STRETCH:
         return None
     rate = moments.trial.rate
     q, qd, qdd = (values[:, 0] for values in _armrs.smooth(np.ascontiguousarray(moments.trial.q[there, joint, None]), rate, cutoff))
@@ -353,7 +354,8 @@ def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
     threshold, latency = (fitted.parameters[key] for key in ("threshold", "latency"))
     said = []
     if not fitted.found:
-        return [f"{name}: no reflex was found up to {fastest:.2g} rad/s"]
+        drives = "; viscosity or dry friction would have to be below zero beside one, and no passive joint drives itself"
+        return [f"{name}: no reflex was found up to {fastest:.2g} rad/s{drives if fitted.parameters['gain'].interval[0] > 0.0 else ''}"]
     if threshold.value < 0.02 * fastest:
         said.append(f"{name}: the threshold of the reflex is close to zero: it cannot be distinguished from a viscosity in one direction")
     if latency.interval[1] > 0.95 * stretch_reflex.LONGEST:
