@@ -1,8 +1,9 @@
 """Sessions of the virtual laboratory as a world of the judge: subjects drawn at random of whom a model of the literature is known.
 
-    python bench/hidden/laboratory.py --seed 60001 --count 12 -o out/hidden/laboratory
+    python bench/hidden/laboratory.py [--family little_known|single|double] [--strength strong|medium] --seed 60001 --count 12 -o FOLDER
 
-What varies is read from `bench/sweep/little_known/SWEEP.toml`; `armrs record` makes each session. The simulator is the one under test,
+What varies is read from `bench/sweep/little_known/SWEEP.toml`; `armrs record` makes each session. In the families single and double the
+laws of the joints are known, without dry friction, and one effect or two more act that are not. The simulator is the one under test,
 behind a robot controller and sensors of its own, so this world shows whether a first day gives results, and whether intervals hold; not
 whether another's laws are recognised.
 """
@@ -13,16 +14,35 @@ import argparse
 import dataclasses
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
-from armrs.model import Model
+import numpy as np
+
+from armrs.model import Effect, Model
 from armrs.montecarlo.sweep_file import load_sweep
+from armrs.workflows.experiment import Experiment
 from armrs.workflows.record import record
+
+FAMILIES = {"single": 1, "double": 2}
+"""Families of arms that are otherwise known, and how many effects are hidden."""
 
 LAWS = {"elastic": ("stiffness", "rest"), "viscous": ("viscosity",), "coulomb": ("coulomb",)}
 """Laws of a joint, by the values in the true model; the size of each is the first."""
 NAMES = {"coulomb": "torque"}
 """What the parameter of an effect is called where a joint calls it otherwise."""
+SIZES: dict[str, tuple[tuple[tuple[float, float], ...], tuple[tuple[float, float], ...]]] = {
+    "coulomb": (((0.15, 0.35), (0.08, 0.18), (0.03, 0.06)), ((0.05, 0.09), (0.025, 0.04), (0.01, 0.018))),
+    "quadratic_drag": (((0.5, 0.9), (0.3, 0.6), (0.15, 0.3)), ((0.2, 0.3), (0.1, 0.15), (0.05, 0.08))),
+    "cubic_elastic": (((4.0, 8.0), (3.0, 6.0), (4.0, 8.0)), ((1.5, 2.5), (1.0, 1.8), (1.5, 2.5))),
+    "relaxation": (((1.2, 2.5), (1.2, 2.5), (0.8, 1.6)), ((0.4, 0.7), (0.3, 0.5), (0.2, 0.35))),
+    "constant_moment": (((1.0, 2.0), (0.6, 1.2), (0.15, 0.3)), ((0.4, 0.6), (0.2, 0.3), (0.05, 0.08))),
+    "biarticular": (((0.5, 1.0), (0.5, 1.0), (0.2, 0.4)), ((0.15, 0.25), (0.15, 0.25), (0.06, 0.1))),
+    "stretch_reflex": (((0.7, 1.2), (0.4, 0.7), (0.2, 0.4)), ((0.25, 0.4), (0.1, 0.16), (0.08, 0.12))),
+}
+"""Hidden effects, and their first parameter [SI] in shoulder, elbow and wrist, strong and medium: the sizes of the MuJoCo world."""
+POSTURE = (-1.05, 1.05, 0.0)
+"""About which the movements lead the arm [rad]."""
 KEPT = ("dataset.toml", "model.toml", "trials")
 
 
@@ -42,9 +62,42 @@ def truth(model: Model) -> list[dict[str, object]]:
     ]
 
 
+def hidden(kind: str, strength: str, draw: np.random.Generator) -> Effect:
+    """Draw an effect of a kind."""
+    joint = int(draw.integers(1 if kind == "biarticular" else 0, 3))
+    size = float(draw.uniform(*SIZES[kind][strength == "medium"][joint]))
+    near = POSTURE[joint] + float(draw.uniform(-0.2, 0.4))
+    others: dict[str, dict[str, float]] = {
+        "coulomb": {"torque": size, "smoothing": 0.0},
+        "quadratic_drag": {"drag": size},
+        "cubic_elastic": {"stiffness": size, "rest": near},
+        "relaxation": {"stiffness": size, "time": float(draw.uniform(0.3, 1.5))},
+        "constant_moment": {"moment": size * float(draw.choice([-1.0, 1.0]))},
+        "biarticular": {"stiffness": size, "ratio": float(draw.uniform(0.7, 1.3)), "rest": near + POSTURE[joint - 1]},
+        "stretch_reflex": {"gain": size, "threshold": float(draw.uniform(0.1, 0.4)), "direction": float(draw.choice([-1.0, 1.0]))},
+    }
+    return Effect(kind, joint + 1, parameters=others[kind])
+
+
+def told(effect: Effect) -> dict[str, object]:
+    """Return an effect as `truth.json` has it; shapes of its law need not be met."""
+    own = {name: {"value": value, "exact": k == 0} for k, (name, value) in enumerate(effect.parameters.items())}
+    return {"kind": effect.kind, "joint": effect.joint, "channel": None, "trial": None, "parameters": own}
+
+
+def prepared(experiment: Experiment, effects: Sequence[Effect]) -> Experiment:
+    """Return an experiment with an arm whose joints are known and frictionless, but for some effects."""
+    truth = experiment.truth.replace(joints=[joint.replace(coulomb=0.0) for joint in experiment.truth.joints])
+    return dataclasses.replace(
+        experiment, truth=truth.replace(effects=(*truth.effects, *effects)), believed=experiment.believed.replace(joints=truth.joints)
+    )
+
+
 def main() -> None:
     """Make the sessions and a manifest of them."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--family", choices=["little_known", *FAMILIES], default="little_known")
+    parser.add_argument("--strength", choices=["strong", "medium"], default="strong")
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--count", type=int, required=True)
     parser.add_argument("-o", type=Path, required=True, dest="folder")
@@ -53,6 +106,13 @@ def main() -> None:
     made = []
     for seed in range(options.seed, options.seed + options.count):
         experiment = dataclasses.replace(sweep, seed=seed).drawn(1)
+        effects = truth(experiment.truth)
+        if options.family in FAMILIES:
+            draw, kinds = np.random.default_rng(seed), list(SIZES)
+            # Numbers that follow each other go round all kinds.
+            own = [kinds[(seed + 3 * k) % len(kinds)] for k in range(FAMILIES[options.family])]
+            added = [hidden(kind, options.strength, draw) for kind in own]
+            experiment, effects = prepared(experiment, added), [told(effect) for effect in added]
         folder = options.folder / f"l{seed}"
         shutil.rmtree(folder, ignore_errors=True)
         record(experiment, folder / "all")
@@ -63,16 +123,16 @@ def main() -> None:
         said = {
             "world": "laboratory",
             "seed": seed,
-            "family": "little_known",
-            "strength": "strong",
+            "family": options.family,
+            "strength": options.strength,
             "joints": len(experiment.truth.joints),
             "null": None,
             "friction": None,
-            "effects": truth(experiment.truth),
+            "effects": effects,
             "noise": {"memory": 0.0},
         }
         (folder / "truth.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-        made.append({"folder": folder.name, "seed": seed, "family": "little_known"})
+        made.append({"folder": folder.name, "seed": seed, "family": options.family})
     (options.folder / "manifest.json").write_text(json.dumps({"sessions": made}, indent=1) + "\n", encoding="utf-8")
 
 
