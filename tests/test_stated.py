@@ -256,7 +256,7 @@ def test_every_extra_is_imported() -> None:
 def test_tolerances_are_warned_of_at_the_multiples_that_files_md_says() -> None:
     """It said five where the code had two, and a tolerance was one deviation here and two there."""
     text = " ".join((ROOT / "docs" / "files.md").read_text(encoding="utf-8").split())
-    said = re.search(r"more than (\w+) its tolerance is pointed out, and one more than (\w+) times its tolerance is warned of", text)
+    said = re.search(r"beyond (\w+) its tolerance is marked; beyond (\w+) times, a warning states", text)
     assert said is not None
     noted, warned = ({"twice": 2.0, "three": 3.0, "four": 4.0, "five": 5.0}[word] for word in said.groups())
     tolerance = armrs.Tolerance(force_bias_N=0.1)

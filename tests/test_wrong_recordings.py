@@ -125,4 +125,4 @@ def test_swapped_channels_of_antagonists_are_asked_about() -> None:
     pair = ["emg_elbow_flexor_uV", "emg_elbow_extensor_uV"]
     data = with_trials(lambda t: {"emg": {**t.emg, pair[0]: t.emg[pair[1]], pair[1]: t.emg[pair[0]]}})
     said = [line for line in armrs.spasticity(data).warnings if "swapped" in line]
-    assert len(said) == 1 and f"{pair[0]} becomes active, and {pair[1]}, the muscle that is stretched, in none" in said[0]
+    assert len(said) == 1 and f"{pair[0]} becomes active, and {pair[1]}, the stretched muscle, in none" in said[0]
