@@ -118,8 +118,8 @@ def _slow_lines(result: Mapping[str, Any], norms: Sequence[Norm], courses: Mappi
 
 
 def best_known(result: Mapping[str, Any], joint: int) -> Mapping[str, Any] | None:
-    """Return the curve of a joint from the movement with an interval and with most repeats."""
-    own = [c for c in result["curves"] if c["joint"] == joint and c.get("half_width_mean_Nm") is not None]
+    """Return the curve of a joint from the slow movement with an interval and with most repeats."""
+    own = [c for c in result["curves"] if c["joint"] == joint and c.get("slow", True) and c.get("half_width_mean_Nm") is not None]
     return max(own, key=lambda c: (None not in (c.get("half_width_interval_Nm") or (None,)), c["repeats"]), default=None)
 
 
