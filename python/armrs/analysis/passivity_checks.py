@@ -19,6 +19,8 @@ RISE = 2.0
 """Activity that rises above this many times its own median is a contraction."""
 SLOW = 0.1
 """Largest share of inertial torques at which a movement counts as slow."""
+NOT_SLOW = "not slow for joint"
+"""Words of the warning that a joint did not move slowly."""
 CLEAR = 3.0
 """A half width is clearly below zero when it is so many half widths of its 95 % interval: chance does that in one of a thousand joints
 without friction at four repeats."""
@@ -108,7 +110,7 @@ def not_slow(curves: Sequence[PassiveCurve], cutoff: float) -> list[str]:
         if c.bandwidth >= cutoff:
             why.append(f"the bandwidth of the movement is {c.bandwidth:.2g} Hz, and the low-pass is at {cutoff:g} Hz")
         if why:
-            lines.append(f"{c.configuration}: not slow for joint {c.joint}: {', and '.join(why)}")
+            lines.append(f"{c.configuration}: {NOT_SLOW} {c.joint}: {', and '.join(why)}")
     return lines
 
 

@@ -96,7 +96,10 @@ def _slow_lines(result: Mapping[str, Any], norms: Sequence[Norm], courses: Mappi
         for quantity in SLOW:
             key = (quantity.kind, f"{quantity.parameter} in {curve['configuration']}", j)
             if quantity is HALF_WIDTH:
-                value, (low, high) = curve["half_width_mean_Nm"], curve.get("half_width_interval_Nm") or (None, None)
+                value, (low, high) = (
+                    curve["half_width_mean_Nm"],
+                    whole(curve, quantity) or curve.get("half_width_interval_Nm") or (None, None),
+                )
             else:
                 found = next(
                     (
@@ -108,13 +111,22 @@ def _slow_lines(result: Mapping[str, Any], norms: Sequence[Norm], courses: Mappi
                 )
                 if found is None or found["value"] is None:
                     continue
-                value, (low, high) = quantity.factor * found["value"], (quantity.factor * x for x in found["interval"])
+                value, (low, high) = (
+                    quantity.factor * found["value"],
+                    (quantity.factor * x for x in whole(curve, quantity) or found["interval"]),
+                )
             interval = None if low is None or high is None else (low, high)
             norm, none_seen = usual.get((quantity.kind, quantity.parameter, j)), quantity is HALF_WIDTH and low is not None and low <= 0.0
             # How far a joint was moved was chosen: that it differs is no change of the arm.
             compared = _NOTHING if quantity.parameter == "range" else _compared(courses, key, quantity)
             lines.append(Line(joint, quantity, value, interval, norm, *compared, at_limit=none_seen))
     return lines
+
+
+def whole(curve: Mapping[str, Any], quantity: Quantity) -> list[float] | None:
+    """Return the interval with the errors that sessions share, such as those of masses; results of older versions have none."""
+    found = curve.get(f"{quantity.parameter}_whole_interval_{'Nm' if quantity is HALF_WIDTH else 'Nm_rad'}")
+    return None if found is None or None in found or not all(map(math.isfinite, found)) else list(found)
 
 
 def best_known(result: Mapping[str, Any], joint: int) -> Mapping[str, Any] | None:
