@@ -348,3 +348,34 @@ def test_norms_are_refused_with_their_place(tmp_path: Path) -> None:
         with pytest.raises(BadInput, match=message):
             clinic_norms.load_norms(tmp_path / "n.toml")
     assert cli.main(["report", "x.json", "--norms", "n.toml"]) == 2
+
+
+def slow_result(*curves: tuple[str, int, float, bool]) -> dict[str, Any]:
+    """Return slow movements: of each its name, joint, range [deg], and whether it was slow."""
+    made = [
+        {"configuration": name, "joint": j, "angle_deg": [0.0, span], "slow": slow, "repeats": 3, "half_width_mean_Nm": 0.1}
+        | {"half_width_interval_Nm": [0.09, 0.11], "half_width_whole_interval_Nm": [0.05, 0.15]}
+        | {"stiffness_whole_interval_Nm_rad": [0.7, 1.3]}
+        for name, j, span, slow in curves
+    ]
+    repeated = [{"joint": j, "name": f"stiffness in {name}", "value": 1.0, "interval": [0.95, 1.05]} for name, j, _, slow in curves if slow]
+    check = {"name": "slow", "passed": all(c[3] for c in curves), "text": "Not slow: inertial torques are at most 23 % (joint 1, stretch3)"}
+    warned = [f"{name}: not slow for joint {j}: inertial torques are 23 %" for name, j, _, slow in curves if not slow]
+    return result(verb="passive", curves=made, repeated=repeated, checks=[check], warnings=warned, history=[])
+
+
+def test_a_held_joint_is_not_advised_to_move_slowly() -> None:
+    """A page said that nothing was unusual, and to mend the inertial torques of joint 1, which was held."""
+    held = slow_result(("stretch3", 1, 4.0, False), ("stretch3", 2, 80.0, True))
+    assert clinic_page.unusual([], [held]) == clinic_page.notes([held]) == clinic_next.next_steps([held], []) == []
+    fast = slow_result(("stretch3", 1, 40.0, False), ("stretch3", 2, 80.0, True))
+    assert clinic_page.unusual([], [fast]) == ["shoulder: moved too fast to measure its slow movement."]
+    (said,) = clinic_next.next_steps([fast], [])
+    assert said.startswith("Move the shoulder more slowly") and clinic_page.notes([fast]) == []
+
+
+def test_the_interval_of_a_slow_movement_has_the_errors_of_the_masses() -> None:
+    """With masses 3 % off, the interval of the repeats excluded the true stiffness."""
+    half_width, stiffness = clinic_lines.lines_of(slow_result(("slow", 2, 80.0, True)))
+    assert half_width.interval == pytest.approx((0.05, 0.15))
+    assert stiffness.interval == pytest.approx((0.7 * math.radians(10.0), 1.3 * math.radians(10.0)))

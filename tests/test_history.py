@@ -404,3 +404,16 @@ def test_a_date_in_the_future_is_refused(slow_arm: Path, tmp_path: Path, capsys:
     error = capsys.readouterr().err
     assert "--date: found 2226-03-14, which is in the future, allowed a date up to today, " in error and error.count("\n") == 1
     assert not (tmp_path / "s.sqlite").exists()
+
+
+def test_the_range_of_a_protocol_is_not_tested_for_a_change() -> None:
+    """It was chosen: it took part in the test of change, and in Holm's correction of the others."""
+    from armrs.workflows import courses
+
+    points = [("2026-01-05", 1.0, 0.1, 1), ("2026-02-03", 1.3, 0.1, 2)]
+    keys = [(f"{name} in slow", "passive", 2, unit) for name, unit in (("half_width", "N m"), ("range", "rad"))]
+    followed = dict.fromkeys(keys, points)
+    half_width, moved = courses._courses(followed, [points] * 2, [points] * 2)
+    assert half_width.p_value == pytest.approx(courses.change(points)[2]) and half_width.changed
+    assert np.isnan([moved.p_value, moved.change, moved.before.p_value, moved.first.p_value, moved.other_arm.p_value]).all()
+    assert not moved.changed and moved.values.tolist() == [1.0, 1.3]

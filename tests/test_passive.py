@@ -12,6 +12,7 @@ import pytest
 
 import armrs
 from armrs import cli
+from armrs.analysis import motion_direction
 from armrs.analysis.passivity_checks import gives_energy
 from armrs.demo import BRAKES
 from conftest import Session
@@ -71,6 +72,44 @@ def test_a_fast_movement_is_warned_of(slow_arm: Path) -> None:
     result = armrs.passive_moments(armrs.load_dataset(slow_arm).replace(trials=(trial,), model=truth), cutoff=5.0)
     assert len(result.warnings) >= 1
     assert "fast: not slow for joint 1: inertial torques are" in result.warnings[0]
+
+
+def test_a_stretch_as_wide_as_the_low_pass_is_not_slow(slow_arm: Path) -> None:
+    """With a reflex, the stiffness of stretches at 99 °/s was twice the true one, and its change was tested."""
+    truth, trials = armrs.load_model(slow_arm / "truth.toml"), []
+    for name, speed in (("slow", 20.0), ("fast", 99.0)):
+        peak, there, back = np.radians(speed), [-40.0, 20.0], [-40.0, 110.0]
+        move = armrs.Movement(np.radians([there, back, there]), speed=peak, acceleration=1.07 * peak**2, pause=2.0, shape="smooth")
+        run = armrs.simulate(truth, move, sensors=armrs.Sensors.realistic(), seeds=range(2))
+        trials += [
+            armrs.Trial(f"{name}_{k}.csv", name, k, "fit", r.time, r.q, r.force_on_arm, None, None) for k, r in enumerate(run.readings, 1)
+        ]
+    result = armrs.passive_moments(armrs.load_dataset(slow_arm).replace(trials=tuple(trials), model=truth))
+    slow, fast = (next(c for c in result.curves if (c.configuration, c.joint) == (name, 2)) for name in ("slow", "fast"))
+    assert slow.slow and slow.bandwidth == pytest.approx(20.0 / 91.3, rel=0.1)
+    assert not fast.slow and fast.bandwidth == pytest.approx(99.0 / 91.3, rel=0.1)
+    (said,) = [line for line in result.warnings if "fast: not slow for joint 2" in line]
+    assert said.endswith("the bandwidth of the movement is 1.1 Hz, and the low-pass is at 1 Hz")
+    assert {e.name for e in result.followed() if e.joint == 2} == {"half_width in slow", "stiffness in slow", "range in slow"}
+    check = result.checks[1]
+    assert check.passed is False and check.text.startswith("Not slow: the bandwidth of a movement is 1.1 Hz")
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "raised cosine", "least jerk"])
+def test_the_bandwidth_is_the_first_zero_of_the_spectrum_of_a_stroke(shape: str) -> None:
+    """By hand: of a stroke of 1.2 s, 1/1.2 Hz for a rectangle, 2/1.2 Hz for a raised cosine, and 1.834/1.2 Hz for least jerk."""
+    rate, length = 1000.0, 1.2
+    x = np.arange(1, 1200) / 1200.0
+    pulse, zero = {
+        "rectangle": (np.where((x > 0.001) & (x < 0.999), 1.0, 0.01), 1.0),
+        "raised cosine": (1.0 - np.cos(2.0 * np.pi * x), 2.0),
+        "least jerk": (30.0 * x**2 * (1.0 - x) ** 2, 1.834),
+    }[shape]
+    speed = np.concatenate([np.zeros(50), pulse, np.zeros(50), -pulse, np.zeros(50)])
+    found = motion_direction.bandwidth(speed, np.sign(speed), rate)
+    assert found == pytest.approx([zero / length] * 2, rel=0.02)
+    # A part of a stroke has no width.
+    assert motion_direction.bandwidth(speed[: 50 + 600], np.sign(speed[: 50 + 600]), rate) == []
 
 
 def test_a_joint_that_gives_energy_is_warned_of(slow_arm: Path) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 import armrs
-from armrs import Dataset, Trial
+from armrs import Dataset, PassiveCurve, Trial
 from armrs.analysis import passivity_checks, uncertainty
 from armrs.analysis.double_exponential import MomentCurve
 from armrs.analysis.joint_coupling import fit
@@ -174,8 +176,16 @@ def test_muscles_that_wake_up_are_seen() -> None:
     assert passivity_checks.muscles_silent([trial({})]).passed is None
     dead = passivity_checks.muscles_silent([trial({"emg_biceps": quiet, "emg_triceps": np.zeros(300)})])
     assert dead.passed is None and "not recorded: emg_triceps" in dead.text
-    assert passivity_checks.slow_enough([("a", 1, 0.02), ("b", 2, 0.3)]).passed is False
-    assert passivity_checks.slow_enough([("a", 1, 0.02)]).passed is True
+
+
+@pytest.mark.parametrize(("share", "bandwidth", "slow"), [(0.02, 0.9, True), (0.3, 0.9, False), (0.02, 1.0, False), (0.02, np.nan, True)])
+def test_slow_is_of_small_inertia_and_below_the_low_pass(share: float, bandwidth: float, slow: bool) -> None:
+    still, other = (
+        cast("PassiveCurve", SimpleNamespace(configuration=name, joint=1, inertial_share=s, bandwidth=b))
+        for name, s, b in (("still", 0.01, 0.2), ("other", share, bandwidth))
+    )
+    assert passivity_checks.slow_enough([still, other], 1.0).passed is slow
+    assert len(passivity_checks.not_slow([still, other], 1.0)) == (not slow)
 
 
 def test_the_result_says_it_all(session: Dataset, tmp_path: Path) -> None:

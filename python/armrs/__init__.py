@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from . import online as online
     from ._armrs import Arm as Arm
     from ._armrs import __version__ as __version__
+    from .analysis.passive_curve import PassiveCurve as PassiveCurve
     from .anthropometry import Expected as Expected
     from .anthropometry import segment_expectations as segment_expectations
     from .catalogue import Parameter as Parameter
@@ -79,7 +80,6 @@ if TYPE_CHECKING:
     from .workflows.initialise import initialise as initialise
     from .workflows.movement import Movement as Movement
     from .workflows.movement import load_movement as load_movement
-    from .workflows.passive import PassiveCurve as PassiveCurve
     from .workflows.passive import PassiveMoments as PassiveMoments
     from .workflows.passive import passive_moments as passive_moments
     from .workflows.plan import Instruments as Instruments
@@ -120,7 +120,8 @@ _HOMES = {
     "workflows.record": ("Recorded", "record"),
     "io.markers": ("Markers", "PlanarMotion", "planar_motion"),
     "model": ("Contact", "Effect", "Joint", "Model", "Robot", "Segment", "Subject", "Tolerance", "load_model"),
-    "workflows.passive": ("PassiveCurve", "PassiveMoments", "passive_moments"),
+    "analysis.passive_curve": ("PassiveCurve",),
+    "workflows.passive": ("PassiveMoments", "passive_moments"),
     "montecarlo": ("Sweep", "Swept", "load_sweep", "sweep"),
     "io.motion_files": ("convert_markers", "convert_motion", "read_markers"),
     "custom_effects": ("OwnEffect", "own_effect"),

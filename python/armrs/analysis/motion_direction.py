@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 LEAST_RANGE = np.radians(2.0)
@@ -25,6 +27,22 @@ def directions(q: np.ndarray, qd: np.ndarray, known: np.ndarray, margin: int) ->
         for sign in (-1, 1):
             result[_deep_inside(signs == sign, margin) & known[:, j], j] = sign
     return result
+
+
+def bandwidth(qd: np.ndarray, direction: np.ndarray, rate: float) -> list[float]:
+    """Return the bandwidth of each stroke of a joint that has samples with a direction [Hz]: one over the time above half its peak speed.
+
+    That is where the spectrum of a pulse of speed is first zero: exactly for a rectangular one and a raised cosine, to 1 % for one of
+    least jerk. Strokes of which the record holds a part, so that they begin or end at more than half their peak speed, are left out.
+    """
+    sign = np.where(np.isfinite(qd), np.sign(qd), 0.0)
+    ends = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
+    found = []
+    for start, stop in pairwise(ends):
+        fast = np.abs(qd[start:stop]) > 0.5 * np.abs(qd[start:stop]).max()
+        if direction[start:stop].any() and not fast[0] and not fast[-1]:
+            found.append(float(rate / fast.sum()))
+    return found
 
 
 def moves(angle: np.ndarray) -> bool:

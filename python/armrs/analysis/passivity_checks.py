@@ -11,6 +11,7 @@ from .. import _armrs
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset
 from ..io.trial import Trial
+from .passive_curve import PassiveCurve
 
 WINDOW = 0.2
 """Time over which muscle activity is averaged [s]."""
@@ -18,6 +19,8 @@ RISE = 2.0
 """Activity that rises above this many times its own median is a contraction."""
 SLOW = 0.1
 """Largest share of inertial torques at which a movement counts as slow."""
+NOT_SLOW = "not slow for joint"
+"""Words of the warning that a joint did not move slowly."""
 CLEAR = 3.0
 """A half width is clearly below zero when it is so many half widths of its 95 % interval: chance does that in one of a thousand joints
 without friction at four repeats."""
@@ -81,24 +84,34 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
     return Check("muscles silent", True, f"Silent: no muscle rises above {ratio:.3g} times its median (allowed {RISE:g}).")
 
 
-def slow_enough(shares: Sequence[tuple[str, int, float]]) -> Check:
-    """Check inertial torques: configuration, joint (from 1) and root mean square relative to the passive moment."""
-    if not shares:
+def slow_enough(curves: Sequence[PassiveCurve], cutoff: float) -> Check:
+    """Check inertial torques relative to the passive moment, and the bandwidth of movements against the low-pass [Hz]."""
+    if not curves:
         return Check("slow", None, "No joint moved far enough to check this.")
-    configuration, joint, share = max(shares, key=lambda item: item[2])
-    found = f"inertial torques are at most {100 * share:.2g} % of the passive moment"
-    where = f"(joint {joint}, {configuration}; allowed {100 * SLOW:.0f} %)"
-    return Check("slow", share <= SLOW, f"{'Slow enough' if share <= SLOW else 'Not slow'}: {found} {where}.")
+    wide = [c for c in curves if c.bandwidth >= cutoff]
+    if wide:
+        worst = max(wide, key=lambda c: c.bandwidth)
+        found = f"the bandwidth of a movement is {worst.bandwidth:.2g} Hz, and the low-pass is at {cutoff:g} Hz"
+        return Check("slow", False, f"Not slow: {found} (joint {worst.joint}, {worst.configuration}).")
+    most = max(curves, key=lambda c: c.inertial_share)
+    found = f"inertial torques are at most {100 * most.inertial_share:.2g} % of the passive moment"
+    where = f"(joint {most.joint}, {most.configuration}; allowed {100 * SLOW:.0f} %)"
+    slow = most.inertial_share <= SLOW
+    return Check("slow", slow, f"{'Slow enough' if slow else 'Not slow'}: {found} {where}.")
 
 
-def not_slow(shares: Sequence[tuple[str, int, float]]) -> list[str]:
+def not_slow(curves: Sequence[PassiveCurve], cutoff: float) -> list[str]:
     """Return the joints that did not move slowly, a line each; takes what `slow_enough` takes."""
-    return [
-        f"{configuration}: not slow for joint {joint}: inertial torques are {100 * share:.0f} % of the passive moment, "
-        f"more than {100 * SLOW:.0f} %"
-        for configuration, joint, share in shares
-        if share > SLOW
-    ]
+    lines = []
+    for c in curves:
+        why = []
+        if c.inertial_share > SLOW:
+            why.append(f"inertial torques are {100 * c.inertial_share:.0f} % of the passive moment, more than {100 * SLOW:.0f} %")
+        if c.bandwidth >= cutoff:
+            why.append(f"the bandwidth of the movement is {c.bandwidth:.2g} Hz, and the low-pass is at {cutoff:g} Hz")
+        if why:
+            lines.append(f"{c.configuration}: {NOT_SLOW} {c.joint}: {', and '.join(why)}")
+    return lines
 
 
 def gives_energy(half_widths: Sequence[tuple[str, int, tuple[float, float]]]) -> list[str]:

@@ -96,7 +96,10 @@ def _slow_lines(result: Mapping[str, Any], norms: Sequence[Norm], courses: Mappi
         for quantity in SLOW:
             key = (quantity.kind, f"{quantity.parameter} in {curve['configuration']}", j)
             if quantity is HALF_WIDTH:
-                value, (low, high) = curve["half_width_mean_Nm"], curve.get("half_width_interval_Nm") or (None, None)
+                value, (low, high) = (
+                    curve["half_width_mean_Nm"],
+                    whole(curve, quantity) or curve.get("half_width_interval_Nm") or (None, None),
+                )
             else:
                 found = next(
                     (
@@ -108,7 +111,10 @@ def _slow_lines(result: Mapping[str, Any], norms: Sequence[Norm], courses: Mappi
                 )
                 if found is None or found["value"] is None:
                     continue
-                value, (low, high) = quantity.factor * found["value"], (quantity.factor * x for x in found["interval"])
+                value, (low, high) = (
+                    quantity.factor * found["value"],
+                    (quantity.factor * x for x in whole(curve, quantity) or found["interval"]),
+                )
             interval = None if low is None or high is None else (low, high)
             norm, none_seen = usual.get((quantity.kind, quantity.parameter, j)), quantity is HALF_WIDTH and low is not None and low <= 0.0
             # How far a joint was moved was chosen: that it differs is no change of the arm.
@@ -117,9 +123,15 @@ def _slow_lines(result: Mapping[str, Any], norms: Sequence[Norm], courses: Mappi
     return lines
 
 
+def whole(curve: Mapping[str, Any], quantity: Quantity) -> list[float] | None:
+    """Return the interval with the errors that sessions share, such as those of masses; results of older versions have none."""
+    found = curve.get(f"{quantity.parameter}_whole_interval_{'Nm' if quantity is HALF_WIDTH else 'Nm_rad'}")
+    return None if found is None or None in found or not all(map(math.isfinite, found)) else list(found)
+
+
 def best_known(result: Mapping[str, Any], joint: int) -> Mapping[str, Any] | None:
-    """Return the curve of a joint from the movement with an interval and with most repeats."""
-    own = [c for c in result["curves"] if c["joint"] == joint and c.get("half_width_mean_Nm") is not None]
+    """Return the curve of a joint from the slow movement with an interval and with most repeats."""
+    own = [c for c in result["curves"] if c["joint"] == joint and c.get("slow", True) and c.get("half_width_mean_Nm") is not None]
     return max(own, key=lambda c: (None not in (c.get("half_width_interval_Nm") or (None,)), c["repeats"]), default=None)
 
 

@@ -13,6 +13,8 @@ from .session_changes import Change
 
 MOST_REPEATS = 10
 """Repeats of a movement beyond which no session goes."""
+HELD = 10.0
+"""A joint that moves less than this beside one that moves more was only held [deg]."""
 ACTIVE = "muscles are active for"
 """Words of the warning that a muscle was active in some trials."""
 MOST_STEPS = 2
@@ -23,7 +25,7 @@ FEWEST_FAST = 2
 
 def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
     """Return measurements that would decide what is open, the first that comes first."""
-    said = [*_mend(results), *_faster(results), *_repeats(results, lines)]
+    said = [*_correct(results), *_slower(results), *_faster(results), *_repeats(results, lines)]
     if any(line.before is not None and line.before.clear for line in lines):
         said.append("Repeat the session within days before acting on a change: strapping and posture differ from day to day.")
     if lines and not any(result.get("session") or result.get("history") for result in results):
@@ -31,15 +33,48 @@ def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> l
     return [*said, *_other_arm(results, lines)]
 
 
-def _mend(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what the checks of the recordings found, to be mended before the next session."""
-    failed = [str(check["text"]) for result in results for check in result.get("checks", ()) if check["passed"] is False]
-    warned = [with_joint_names(str(line), r["data"]["joints"]) for r in results for line in r["data"].get("warnings", ())]
+def faults(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what the checks of the recordings found, in a line at most."""
+    failed = [text for result in results for text in failed_checks(result)]
+    warned = [with_joint_names(str(line), r["data"]["joints"]) for r in results for line in r.get("data", {}).get("warnings", ())]
     # In a stretch that a reflex resists, the muscle is active.
     reflex = any(result["verb"] == "spasticity" and any(e["decided"] for e in result["effects"]) for result in results)
     found = [line for line in dict.fromkeys([*failed, *warned]) if not (reflex and ACTIVE in line)]
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return [f"Correct before the next session: {found[0].rstrip('.')}{more}."] if found else []
+    return [f"{found[0].rstrip('.')}{more}."] if found else []
+
+
+def failed_checks(result: Mapping[str, Any]) -> list[str]:
+    """Return what the checks of a result found; a movement that was not slow is stated by `too_fast`."""
+    failed = [str(c["text"]) for c in result.get("checks", ()) if c["passed"] is False and c["name"] != "slow"]
+    return [with_joint_names(text, result["data"]["joints"]) for text in failed]
+
+
+def too_fast(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the joints that were moved, and never slowly; one that was held beside another that moved is none."""
+    found = []
+    for result in results:
+        moved: dict[str, bool] = {}
+        for curve in result.get("curves", ()):
+            spans = {c["joint"]: max(c["angle_deg"]) - min(c["angle_deg"]) for c in result["curves"] if _beside(c, curve)}
+            if spans[curve["joint"]] >= HELD or max(spans.values()) < HELD:
+                name = result["data"]["joints"][curve["joint"] - 1]
+                moved[name] = moved.get(name, False) or curve.get("slow", True)
+        found += [name for name, slowly in moved.items() if not slowly]
+    return list(dict.fromkeys(found))
+
+
+def _beside(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    return bool(one["configuration"] == other["configuration"])
+
+
+def _correct(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    return [f"Correct before the next session: {line}" for line in faults(results)]
+
+
+def _slower(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return which joints to move more slowly."""
+    return [f"Move the {joint} more slowly: resistance and stiffness of slow movement are then measured." for joint in too_fast(results)]
 
 
 def _faster(results: Sequence[Mapping[str, Any]]) -> list[str]:

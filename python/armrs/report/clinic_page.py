@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from .. import checks
+from ..analysis.passivity_checks import NOT_SLOW
 from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import arm_side
 from . import clinic_trends, html, pages, session_changes
 from .clinic_lines import Line, laboratory, lines_of, once, words_of
-from .clinic_next import next_steps
+from .clinic_next import failed_checks, faults, next_steps, too_fast
 from .clinic_norms import Norm
 from .sentences import disturbance, is_synthetic, name, together, with_joint_names
 
@@ -238,7 +239,8 @@ def unusual(lines: Sequence[Line], results: Sequence[Mapping[str, Any]] = ()) ->
     for line in lines:
         if line.beside_norm in ("below", "above"):
             said.append(f"{line.joint}: {line.quantity.title.lower()} is {line.beside_norm} the usual range.")
-    return said
+    said += [f"{joint}: moved too fast to measure its slow movement." for joint in too_fast(results)]
+    return [*said, *faults(results)]
 
 
 def found(result: Mapping[str, Any]) -> list[str]:
@@ -257,8 +259,9 @@ def found(result: Mapping[str, Any]) -> list[str]:
 
 def notes(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the reservations of the analysis about its own numbers."""
-    said = [str(check["text"]) for result in results for check in result.get("checks", ()) if check["passed"] is False]
-    said = together(said + [with_joint_names(str(line), r["data"]["joints"]) for r in results for line in r.get("warnings", ())])
+    said = [text for result in results for text in failed_checks(result)]
+    warned = [(str(line), r["data"]["joints"]) for r in results for line in r.get("warnings", ())]
+    said = together(said + [with_joint_names(line, joints) for line, joints in warned if NOT_SLOW not in line])
     more = len(said) - MOST_NOTES
     return said if more <= 0 else [*said[:MOST_NOTES], f"and {more} more, in the reports of the analysis"]
 

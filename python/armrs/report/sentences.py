@@ -142,7 +142,9 @@ def _passive(result: Mapping[str, Any]) -> str:
         low, high = curve.get("half_width_interval_Nm") or (None, None)
         unclear = low is not None and high is not None and low <= 0.0 < high
         size = f"at most {high:.2g}" if unclear else f"{curve['half_width_mean_Nm']:.3g}"
-        parts.setdefault(curve["joint_name"], []).append(f"{size} N m ({curve['configuration']})")
+        parts.setdefault(curve["joint_name"], []).append(
+            f"{size} N m ({curve['configuration']}{'' if curve.get('slow', True) else ', not slow'})"
+        )
     said = "; ".join(f"{joint} {', '.join(sizes)}" for joint, sizes in parts.items())
     return f"Half width of the hysteresis, with the movement in brackets: {said}."
 

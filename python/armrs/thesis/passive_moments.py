@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from .. import _armrs
+from ..analysis.passive_curve import PassiveCurve
 from ..formatting import minus
 from ..report import plotting
 from ..report.figures import Drawn
 from ..report.tables import Table
-from ..workflows.passive import PassiveCurve
 from . import shared_figures
 from .report_item import Found, Group, Sheet
 from .virtual_sessions import ELBOW_STD, SHOULDER_HELD, SHOULDER_STD, Session, configurations, holding, session, subject_one

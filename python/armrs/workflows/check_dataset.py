@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import checks
-from ..analysis.passivity_checks import SLOW
+from ..analysis.passive_curve import PassiveCurve
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..formatting import how_many
 from ..io import plausibility
@@ -27,7 +27,7 @@ from ..tabular import Tabular, Tidy
 from . import setup_check
 from .gap import data_checks
 from .importing.clock_offset import lateness
-from .passive import PassiveCurve, passive_moments
+from .passive import passive_moments
 
 _LATE, _LATE_BY = 0.06, 2.0
 """Forces are called late from this on [s], when shifting them leaves so many times less unexplained."""
@@ -482,9 +482,9 @@ def _passive(dataset: Dataset) -> Ability:
     if not found.curves:
         why = f"no joint moves long enough in both directions over the same angles for a low-pass at {found.cutoff:g} Hz"
         return Ability("passive", False, why)
-    slow, fast = ([c for c in found.curves if (c.inertial_share <= SLOW) is one] for one in (True, False))
+    slow, fast = ([c for c in found.curves if c.slow is one] for one in (True, False))
     said = [f"slow movements of {_by_joint(slow)}"] if slow else []
-    said += [f"not slow, inertial torques exceed {100 * SLOW:.0f} % of the moment: {_by_joint(fast)}"] if fast else []
+    said += [f"not slow: {_by_joint(fast)}"] if fast else []
     return Ability("passive", True, "; ".join(said))
 
 

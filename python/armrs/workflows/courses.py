@@ -275,6 +275,11 @@ def _last_of_each(
 def _courses(
     followed: Mapping[_Key, Sequence[_Point]], alike: Sequence[Sequence[_Point]], others: Sequence[Sequence[_Point]]
 ) -> tuple[Course, ...]:
+    # How far a joint was moved was chosen: it is shown, and not tested.
+    alike, others = (
+        [p[-1:] if key[1] == "passive" and key[0].startswith("range in ") else p for key, p in zip(followed, each, strict=True)]
+        for each in (alike, others)
+    )
     tests = [change(points) for points in alike]
     adjusted = holm([p for *_, p in tests])
     before, first, other = (

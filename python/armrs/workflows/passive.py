@@ -21,10 +21,10 @@ from ..analysis import (
     passivity_checks,
     preconditioning,
     repeat_statistics,
-    students_t,
     uncertainty,
 )
 from ..analysis.joint_centres import JointCentres
+from ..analysis.passive_curve import LEVEL, PassiveCurve, interval_of
 from ..errors import BadInput, Text
 from ..io import resample
 from ..io.dataset import Dataset, load_dataset
@@ -51,13 +51,6 @@ LEAST_WEIGHT = 0.5
 """Torque of the weight from which on that is checked [N m]."""
 RESTING = 0.02
 """A joint rests when its speed is below this part of its usual speed in the trial."""
-LEVEL = 0.95
-"""Probability of the intervals, and one minus the level of the tests."""
-
-
-_COLUMNS = (
-    "rising", "falling", "elastic", "elastic_std", "elastic_systematic", "half_width", "half_width_std", "half_width_systematic",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,110 +82,6 @@ class TrialMoments:
     direction: np.ndarray
     force: np.ndarray | None
     sign: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class PassiveCurve:
-    """Passive moment of one joint against its angle, over the repeats of one configuration.
-
-    Shapes are (k,). Means and deviations stand at angles that all repeats share, where there are such, and are NaN elsewhere.
-
-    Attributes
-    ----------
-    configuration : str
-    joint : int
-        From 1.
-    repeats : int
-    angle : ndarray
-        Centres of the bins [rad].
-    rising, falling : ndarray
-        Mean moment while the angle grows and shrinks [N m].
-    elastic, elastic_std : ndarray
-        Mean of both directions, and its standard deviation over repeats [N m]; the deviation is NaN for a single repeat.
-    half_width, half_width_std : ndarray
-        Half the difference of both directions: the dissipative part [N m].
-    inertial_share : float
-        Root mean square of the inertial torque that was taken off, relative to that of the moment.
-    elastic_repeats, half_width_repeats : ndarray, shape (repeats, k)
-        The same of every repeat [N m].
-    held : ndarray, shape (repeats, n_joints)
-        Mean angle of every joint in every repeat [rad].
-    elastic_systematic, half_width_systematic : ndarray
-        Standard deviations from the declared uncertainty of masses, lengths, angles and forces, the same error in all repeats [N m].
-    elastic_errors : ndarray, shape (n_errors, k)
-        What each of these errors does to the elastic mean, of the size of its standard deviation [N m].
-    placed_errors : ndarray, shape (2, n_placed, k)
-        What markers that every session places anew do to the elastic mean and to the half width, likewise [N m].
-    """
-
-    configuration: str
-    joint: int
-    repeats: int
-    angle: np.ndarray
-    rising: np.ndarray
-    falling: np.ndarray
-    elastic: np.ndarray
-    elastic_std: np.ndarray
-    half_width: np.ndarray
-    half_width_std: np.ndarray
-    inertial_share: float
-    elastic_repeats: np.ndarray = field(repr=False)
-    half_width_repeats: np.ndarray = field(repr=False)
-    held: np.ndarray = field(repr=False)
-    elastic_systematic: np.ndarray
-    half_width_systematic: np.ndarray
-    elastic_errors: np.ndarray = field(repr=False)
-    placed_errors: np.ndarray = field(repr=False)
-
-    def interval(self, part: str) -> tuple[float, float]:
-        """Return the interval of the mean over angles of `elastic` or `half_width`, from the scatter of the repeats [N m].
-
-        Student's t over the repeats, on angles that all of them cover. Errors that are the same in all repeats are not in it.
-        """
-        return _interval(self._means(part))
-
-    def stiffness(self) -> np.ndarray:
-        """Return the slope of the straight line through the elastic mean of every repeat [N m/rad], on angles that all of them cover."""
-        angle, values = self._shared("elastic")
-        return np.polyfit(angle, values.T, 1)[0] if len(angle) > 1 else np.full(len(values), np.nan)
-
-    def placed(self) -> dict[str, float]:
-        """Return the standard deviations of `half_width` [N m] and `stiffness` [N m/rad] from markers that every session places anew."""
-        there = np.isfinite(self.placed_errors).all(axis=(0, 1))
-        if there.sum() < 2:
-            return {}
-        elastic, half_width = self.placed_errors[:, :, there]
-        slopes = np.polyfit(self.angle[there], elastic.T, 1)[0]
-        return {"half_width": float(np.linalg.norm(half_width.mean(axis=1))), "stiffness": float(np.linalg.norm(slopes))}
-
-    def _means(self, part: str) -> np.ndarray:
-        """Return the mean of every repeat over the angles that all of them cover, none where there is no such angle."""
-        _, values = self._shared(part)
-        return np.asarray(values.mean(axis=1)) if values.size else np.empty(0)
-
-    def _shared(self, part: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the angles that all repeats cover, (k,), and the values there, (repeats, k)."""
-        repeats = getattr(self, f"{part}_repeats")
-        there = np.isfinite(repeats).all(axis=0)
-        return self.angle[there], repeats[:, there]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data with units in the names."""
-        there = np.isfinite(self.half_width)
-        return {
-            "configuration": self.configuration,
-            "joint": self.joint,
-            "repeats": self.repeats,
-            "inertial_share": self.inertial_share,
-            "half_width_mean_Nm": float(np.mean(self.half_width[there])),
-            "elastic_mean_Nm": float(np.mean(self.elastic[there])),
-            "elastic_std_most_Nm": float(np.max(self.elastic_std[np.isfinite(self.elastic_std)], initial=0.0)),
-            "half_width_interval_Nm": list(self.interval("half_width")),
-            "elastic_interval_Nm": list(self.interval("elastic")),
-            "held_deg": np.degrees(self.held.mean(axis=0)),
-            "angle_deg": np.degrees(self.angle),
-            **{f"{n}_Nm": getattr(self, n) for n in _COLUMNS},
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,11 +127,11 @@ class PassiveMoments(Tabular):
     def followed(self) -> tuple[Estimate, ...]:
         """Return what a history keeps, with intervals from the scatter of the repeats and from markers, which every session places anew.
 
-        For each configuration and joint the mean half width of the hysteresis [N m], the stiffness [N m/rad] and the range that was moved
-        through [rad]; for each pair of joints their coupling [N m/rad].
+        For each joint in each slow movement the mean half width of the hysteresis [N m], the stiffness [N m/rad] and the range that was
+        moved through [rad]; for each pair of joints their coupling [N m/rad].
         """
         found = []
-        for curve in self.curves:
+        for curve in (c for c in self.curves if c.slow):
             own = [
                 m.q[np.isfinite(m.q[:, curve.joint - 1]), curve.joint - 1]
                 for m in self.trials
@@ -250,12 +139,12 @@ class PassiveMoments(Tabular):
             ]
             placed = curve.placed()
             quantities = {
-                "half_width": (curve._means("half_width"), "N m"),
+                "half_width": (curve.means("half_width"), "N m"),
                 "stiffness": (curve.stiffness(), "N m/rad"),
                 "range": (np.array([np.ptp(angles) for angles in own if angles.size]), "rad"),
             }
             found += [
-                _estimate(f"{name} in {curve.configuration}", curve.joint, _interval(values, placed.get(name, 0.0)), unit)
+                _estimate(f"{name} in {curve.configuration}", curve.joint, interval_of(values, placed.get(name, 0.0)), unit)
                 for name, (values, unit) in quantities.items()
             ]
         found += [_estimate(f"coupling {c.joints[0]}-{c.joints[1]}", None, c.interval, "N m/rad") for c in self.couplings]
@@ -274,15 +163,6 @@ class PassiveMoments(Tabular):
     def to_dict(self) -> dict[str, Any]:
         """Return the curves as plain data."""
         return {"curves": [c.to_dict() for c in self.curves], "warnings": list(self.warnings)}
-
-
-def _interval(values: np.ndarray, shared: float = 0.0) -> tuple[float, float]:
-    """Return the interval of the mean of repeats, with a standard deviation that they share; NaN for fewer than two."""
-    if len(values) < 2:
-        return (float("nan"), float("nan"))
-    mean, scatter = float(values.mean()), float(values.std(ddof=1)) / np.sqrt(len(values))
-    half = students_t.half_width(LEVEL, scatter, len(values) - 1, shared)
-    return (mean - half, mean + half)
 
 
 def _estimate(name: str, joint: int | None, interval: tuple[float, float], unit: str) -> Estimate:
@@ -341,7 +221,7 @@ def passive_moments(
         repeats = [m for m in trials if m.trial.configuration == configuration]
         lost = []
         for joint in range(dataset.model.n_joints):
-            curve = _curve(dataset, repeats, joint, bins, centres)
+            curve = _curve(dataset, repeats, joint, bins, centres, cutoff)
             if curve is not None:
                 curves.append(curve)
             elif any(motion_direction.moves(m.q[:, joint]) for m in repeats):
@@ -352,13 +232,12 @@ def passive_moments(
                 f"same angles for a low-pass at {cutoff:g} Hz: left out"
             )
         warnings += _doubtful(dataset, repeats)
-    shares = [(c.configuration, c.joint, c.inertial_share) for c in curves]
-    assumptions = (passivity_checks.muscles_silent(dataset.trials), passivity_checks.slow_enough(shares))
+    assumptions = (passivity_checks.muscles_silent(dataset.trials), passivity_checks.slow_enough(curves, cutoff))
     if assumptions[0].passed is False:
         warnings.append(assumptions[0].text)
     warnings += passivity_checks.gives_energy([(c.configuration, c.joint, c.interval("half_width")) for c in curves])
-    warnings += passivity_checks.not_slow(shares)
-    fitted = _dependence(curves)
+    warnings += passivity_checks.not_slow(curves, cutoff)
+    fitted = _dependence([c for c in curves if c.slow])
     both = tuple(
         joint_coupling.together(one, other)
         for one in fitted
@@ -444,7 +323,9 @@ def _carried(unit: _armrs.Arm, q: np.ndarray, acceleration: np.ndarray) -> np.nd
     return np.asarray(acceleration[:, :1] * unit.gravity(turned) + acceleration[:, 1:] * unit.gravity(q))
 
 
-def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int, centres: JointCentres) -> PassiveCurve | None:
+def _curve(
+    dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: int, centres: JointCentres, cutoff: float
+) -> PassiveCurve | None:
     moving = [m.direction[:, joint] != 0 for m in repeats]
     samples = [m.q[keep, joint] for m, keep in zip(repeats, moving, strict=True)]
     angles = np.concatenate(samples)
@@ -465,6 +346,10 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
     systematic = [part[:declared] for part in errors]
     moved = [(m.inertial[keep, joint], m.moment[keep, joint]) for m, keep in zip(repeats, moving, strict=True)]
     inertial, moment = (np.concatenate(part) for part in zip(*moved, strict=True))
+    inertial_share = float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2)))
+    strokes = [b for m in repeats for b in motion_direction.bandwidth(m.qd[:, joint], m.direction[:, joint], m.trial.rate)]
+    # What a joint moves that is held is no movement of its own.
+    bandwidth = float(np.median(strokes)) if strokes and np.ptp(edges) > joint_coupling.LEAST_HELD else float("nan")
     return PassiveCurve(
         configuration=repeats[0].trial.configuration,
         joint=joint + 1,
@@ -476,13 +361,16 @@ def _curve(dataset: Dataset, repeats: Sequence[TrialMoments], joint: int, bins: 
         elastic_std=repeat_statistics.deviation(elastic) + kept,
         half_width=repeat_statistics.mean(half_width) + kept,
         half_width_std=repeat_statistics.deviation(half_width) + kept,
-        inertial_share=float(np.sqrt(np.mean(inertial**2) / np.mean(moment**2))),
+        inertial_share=inertial_share,
+        bandwidth=bandwidth,
+        slow=inertial_share <= passivity_checks.SLOW and not bandwidth >= cutoff,
         elastic_repeats=elastic,
         half_width_repeats=half_width,
         held=np.array([repeat_statistics.mean(m.q) for m in repeats]),
         elastic_systematic=uncertainty.by_jacobian(systematic[0]),
         half_width_systematic=uncertainty.by_jacobian(systematic[1]),
         elastic_errors=systematic[0],
+        half_width_errors=systematic[1],
         placed_errors=np.array([part[declared:] for part in errors]),
     )
 

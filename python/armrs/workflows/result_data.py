@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from .. import _armrs
+from ..analysis.passive_curve import LEVEL
 from ..analysis.quantity_expressions import value_in
 from ..errors import BadInput
 from ..io.dataset import Dataset
 from ..model import Contact
 from .identify import Estimate, Identified
 from .importing.recipe import FILE, load_recipe
-from .passive import LEVEL, PassiveMoments
+from .passive import PassiveMoments
 from .simulate import Run, Simulated
 
 
