@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import armrs
+import patients
 from armrs import cli, demo
 from armrs.workflows.check_dataset import Ability, Checked, Problem, check_dataset, grouped
 from armrs.workflows.gap.data_checks import examine
@@ -144,6 +145,41 @@ def test_of_two_rates_in_halves_one_that_was_recorded_is_told(session: Path, tmp
     halves: dict[str, Change] = {f"slow_{k}": lambda s: s[::2] for k in (1, 2, 3)}
     told = [p.text for p in check_dataset(changed(session, tmp_path / "halves", halves)).problems if "samples a second" in p.text]
     assert told and all("50 samples a second, where others have 100" in text for text in told)
+
+
+def test_a_repeat_that_broke_off_is_named(session: Path, tmp_path: Path) -> None:
+    assert besides(check_dataset(changed(session, tmp_path / "a", {"slow_2": lambda s: s[: int(0.75 * len(s))]})).problems) == []
+    folder = changed(session, tmp_path / "set", {name: lambda s: s[: len(s) // 2] for name in ("slow_2", "reach_3")})
+    problems = grouped(check_dataset(folder).problems)
+    whole = np.genfromtxt(session / "trials" / "slow_1.csv", delimiter=",", skip_header=1)[:, 0]
+    long, half = whole[-1] - whole[0], whole[len(whole) // 2 - 1] - whole[0]
+    lines = [f"trials/{name}.csv lasts {half:.1f} s, its repeats {long:.1f} s" for name in ("slow_2", "reach_3")]
+    assert sorted(besides(problems)) == sorted(lines)
+    assert {p.next_step for p in problems if "lasts" in p.text} == {"record this repeat again, or nothing if it was ended on purpose"}
+
+
+def test_of_stretches_the_reflex_is_asked_for_and_no_test_trial(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing was said of `spasticity`, and that the gap cannot be measured was a warning."""
+    stretches = patients.session(patients.Patient(), 7001, emg=True)
+
+    def with_faults(t: armrs.Trial) -> armrs.Trial:
+        biceps = t.emg["emg_biceps_uV"]
+        return replace(t, emg={"emg_biceps_uV": biceps.clip(-12.0, 12.0), "emg_triceps_uV": 0.0 * biceps})
+
+    folder = armrs.write_dataset(stretches.replace(trials=tuple(map(with_faults, stretches.trials))), tmp_path / "stretches").parent
+    found = check_dataset(folder)
+    assert found.verbs[0] == Ability("spasticity", True, f"{len(stretches.trials)} stretches of the elbow at several speeds")
+    assert not [p for p in found.problems if "role" in p.text]
+    assert "without trials with role" in next(v.why for v in found.verbs if v.verb == "gap")
+    faults = [p.text for p in found.problems if "emg_" in p.text and "active" not in p.text]
+    assert len(faults) == 2 and "emg_biceps_uV stays at" in faults[0] and "emg_triceps_uV is constant: a dead channel?" in faults[1]
+    assert cli.main(["check", str(folder)]) == 0
+    assert "Next: armrs spasticity" in capsys.readouterr().out
+    for verb in ("spasticity", "passive", "identify", "gap"):
+        assert cli.main([verb, str(folder)]) == 0
+        told = capsys.readouterr()
+        assert all(words in told.out + told.err for words in ("saturated?", "a dead channel?")), verb
+    assert "spasticity" not in {v.verb for v in check_dataset(session).verbs}
 
 
 def test_two_joints_are_not_one_problem_and_one_more() -> None:

@@ -447,3 +447,28 @@ def test_angles_are_counted_in_one_turn_in_all_trials(
 def test_angles_within_a_turn_are_left_as_they_are(recording: Recording, tmp_path: Path) -> None:
     done = armrs.import_recordings(_one_turn(recording, tmp_path, lambda q: q), tmp_path / "set", model=KNOWN)
     assert [c.lowest for c in done.recipe.channels] == [None] * 5 and "lowest" not in (done.folder / "import.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("newtons", "words"),
+    [
+        (4.4482216, "(forces stated in N that are lbf? Then 0."),
+        (1e3, "forces stated in N that are kN?"), (1e-3, "forces stated in kN that are N?"),
+    ],
+)  # fmt: skip
+def test_forces_in_another_unit_are_not_taken_for_another_convention(
+    newtons: float, words: str, recording: Recording, tmp_path: Path
+) -> None:
+    """The refusal named two conventions that explain the forces equally well, and nothing else."""
+    path = write_text(tmp_path / "slow_1.csv", *table(recording, names=SI, force=1.0 / newtons))
+    with pytest.raises(BadInput) as refused:
+        armrs.import_recordings([path], tmp_path / "set", model=KNOWN)
+    assert words in str(refused.value)
+
+
+def test_noise_is_no_other_unit(recording: Recording, tmp_path: Path) -> None:
+    names, values = table(recording, names=SI)
+    values[:, 3:] = np.random.default_rng(1).standard_normal((len(values), 2))
+    with pytest.raises(BadInput, match="unexplained by the best convention") as refused:
+        armrs.import_recordings([write_text(tmp_path / "slow_1.csv", names, values)], tmp_path / "set", model=KNOWN)
+    assert "that are" not in str(refused.value)

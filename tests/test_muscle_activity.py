@@ -13,7 +13,7 @@ import pytest
 
 import armrs
 from armrs.analysis import repeat_statistics
-from armrs.io.muscle_activity import _applied, co_contraction, comparable, joint_activity, mark_activity, onset
+from armrs.io.muscle_activity import _applied, channel_faults, co_contraction, comparable, joint_activity, mark_activity, onset
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import check_passive
@@ -204,6 +204,53 @@ def test_a_data_set_without_or_with_dead_channels_is_as_it_was(share: float) -> 
     plain = armrs.Trial(one.file, one.configuration, 1, "fit", one.t, one.q, force_on_arm=one.force_on_arm, emg=kept)
     marked, lines = mark_activity([plain])
     assert marked[0].valid.all() and lines == []
+
+
+def channels(**emg: np.ndarray) -> armrs.Trial:
+    t = np.arange(4000) / 1000.0
+    return armrs.Trial("a.csv", "a", 1, "fit", t, np.zeros((len(t), 1)), emg={f"emg_{name}": values for name, values in emg.items()})
+
+
+def test_dead_and_saturated_channels_are_named_with_their_files() -> None:
+    """They passed every verb without a word."""
+    draw = np.random.default_rng(3)
+    burst = np.where(np.arange(4000) // 500 % 4 == 3, 10.0, 1.0) * draw.standard_normal(4000)
+    good = {
+        "noise": burst,
+        "of_few_levels": np.round(2.0 * burst),
+        "rectified": np.maximum(np.abs(burst) - 2.0, 0.0),
+        "with_a_gap": np.where(np.arange(4000) < 2000, np.nan, burst),
+        "not_recorded": np.full(4000, np.nan),
+        "switch": 1.0 * (np.arange(4000) > 2000),
+    }
+    assert channel_faults([channels(**good)]) == []
+    trials = [
+        dataclasses.replace(channels(triceps=triceps, biceps=biceps), file=file)
+        for file, triceps, biceps in (
+            ("a.csv", np.full(4000, 0.3), np.clip(burst, -8.0, 8.0)), ("b.csv", burst, burst.clip(-3.0, 3.0)),
+            ("c.csv", np.zeros(4000), np.maximum(burst, -8.0).clip(None, 8.0)),
+        )
+    ]  # fmt: skip
+    dead, clipped = channel_faults(trials)
+    assert dead == "a.csv and 1 more: emg_triceps is constant: a dead channel?"
+    n = 2 * int((np.abs(burst) >= 8.0).sum())
+    assert clipped == f"a.csv and 1 more: emg_biceps stays at 8 or -8, its extreme, in {n} samples: saturated?"
+
+
+def test_channels_that_are_resampled_are_judged_as_read(tmp_path: Path) -> None:
+    """Interpolation between samples of uneven times leaves few of them at the extreme."""
+    one = trial(1, 11, True)
+    uneven = one.t + 2e-3 * np.sin(np.arange(len(one.t)))
+    clipped = np.clip(one.emg["emg_biceps"], -0.03, 0.03)
+    assert one.force_on_arm is not None
+    table = np.column_stack([uneven, one.q, one.force_on_arm, clipped])
+    head = "t_s,q1_rad,q2_rad,Fy_N,Fz_N,emg_biceps"
+    folder = armrs.write_dataset(armrs.Dataset("one", MODEL, (one,), force_on="arm"), tmp_path / "one").parent
+    [path] = folder.rglob("slow_1.csv")
+    np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.9g")
+    loaded = armrs.load_dataset(folder)
+    assert loaded.trials[0].resampled
+    assert sum("emg_biceps stays at 0.03 or -0.03" in line for line in loaded.warnings) == 1
 
 
 MUSCLES = (armrs.model.Muscle("emg_elbow_flexor_uV", 1, mvc=50.0, rest=2.0, delay_s=0.0), armrs.model.Muscle("emg_other", 1))

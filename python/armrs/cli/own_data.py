@@ -317,12 +317,10 @@ def _ask_columns(sources: list[Path], points: tuple[str, ...], model: Path) -> s
 
 
 def _after_check(done: Checked, dataset: Path) -> str:
-    from ..analysis.stretch_sessions import stretched_joint
-
     place = shlex.quote(str(dataset))
     if done.errors:
         return f"correct the errors above, then armrs check {place} again"
-    if done.dataset is not None and stretched_joint(done.dataset.trials) is not None:
+    if any(v.verb == "spasticity" and v.able for v in done.verbs):
         return f"armrs spasticity {place} -o spasticity, then armrs passive {place} -o passive: a joint is stretched at several speeds"
     able = [
         f"armrs {v.verb} {place} -o {'identified' if v.verb == 'identify' else v.verb}"

@@ -21,7 +21,7 @@ from ..result_warnings import with_warnings
 from ..tabular import Framed, Labelled, Series, Tidy, over_trials
 from . import files
 from .dataset_errors import dataset_errors_of
-from .muscle_activity import joint_activity, mark_activity
+from .muscle_activity import channel_faults, joint_activity, mark_activity
 from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
@@ -252,7 +252,7 @@ def load_dataset(source: str | os.PathLike[str]) -> Dataset:
         marked, relative = joint_activity(marked, description.muscles, model.n_joints)
     except BadInput as error:
         raise error.within(file=path) from None
-    warnings += [*lines, *relative]
+    warnings += [*channel_faults(trials), *lines, *relative]
     return Dataset(
         name=name_of(path, description),
         model=model,

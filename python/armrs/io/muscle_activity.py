@@ -15,6 +15,7 @@ import numpy as np
 from .. import checks
 from ..errors import BadInput, Text
 from ..model import Muscle
+from .files import first_of
 from .trial import Trial
 
 SMOOTHED = 0.1
@@ -33,6 +34,10 @@ ONSET_BEFORE = 0.15
 """How long before that an onset is looked for [s]: the averages and a gradual rise delay the alarm by less."""
 _RISES = 24
 """Slopes of a gradual onset that are compared."""
+_CLIPPED = 20
+"""Samples at one and the same extreme from which on a channel may be saturated."""
+_NEAR, _OFTEN = 0.02, 3.0
+"""Part of the range of a channel that is next to its extreme, and how much oftener a saturated channel is at it than next to it."""
 _TO_SIGMA = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
@@ -69,6 +74,49 @@ def mark_activity(trials: Sequence[Trial]) -> tuple[tuple[Trial, ...], list[str]
         for own, mark in zip(active, marks, strict=True):
             own |= mark
     return _applied(trials, active, lines)
+
+
+def channel_faults(trials: Sequence[Trial]) -> list[str]:
+    """Return the channels that are constant in a trial, and those that are cut off at an extreme, a line each with the files.
+
+    Samples count as read: between time stamps of a grid, interpolation blurs both.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Of one session, whose channels have one gain.
+    """
+    lines = []
+    for name in dict.fromkeys(name for trial in trials for name in trial.emg):
+        read = [(trial.file, trial.original.get(name, trial.emg[name])) for trial in trials if name in trial.emg]
+        there = [(file, values[np.isfinite(values)]) for file, values in read]
+        dead = [file for file, values in there if values.size and np.ptp(values) == 0.0]
+        if dead:
+            lines.append(f"{first_of(dead)}: {name} is constant: a dead channel?")
+        lines += _clipped(name, [(file, values) for file, values in there if file not in dead])
+    return lines
+
+
+def _clipped(name: str, columns: Sequence[tuple[str, np.ndarray]]) -> list[str]:
+    """Return the line on a channel that is at an extreme of the session in many samples, and hardly ever next to it."""
+    levels, counts = np.unique(np.concatenate([np.empty(0), *(values for _, values in columns)]), return_counts=True)
+    if len(levels) < 3:  # a switch, not a signal
+        return []
+    # Rectified signals rest at zero.
+    ends = (-1,) if levels[0] >= 0.0 else (-1, 0)
+    close = _NEAR * (levels[-1] - levels[0])
+    clipped = []
+    for end in ends:
+        near = np.abs(levels - levels[end]) <= close
+        # The next level counts as well: steps of a converter may be wider.
+        beside = max(int(counts[near].sum() - counts[end]), int(counts[1 if end == 0 else -2]))
+        if counts[end] >= max(_CLIPPED, _OFTEN * beside):
+            clipped.append(float(levels[end]))
+    if not clipped:
+        return []
+    shares = [(file, int(np.isin(values, clipped).sum())) for file, values in columns]
+    where, total = first_of([file for file, n in shares if n]), sum(n for _, n in shares)
+    return [f"{where}: {name} stays at {' or '.join(f'{level:g}' for level in clipped)}, its extreme, in {total} samples: saturated?"]
 
 
 def _applied(trials: Sequence[Trial], active: list[np.ndarray], lines: list[str]) -> tuple[tuple[Trial, ...], list[str]]:

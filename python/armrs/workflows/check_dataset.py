@@ -15,11 +15,13 @@ import numpy as np
 
 from .. import checks
 from ..analysis.passive_curve import PassiveCurve
+from ..analysis.stretch_sessions import stretched_joint
 from ..errors import ArmrsError, BadInput, BadInputs
 from ..formatting import how_many
 from ..io import plausibility
 from ..io.dataset import FILE, NO_MODEL, Dataset, describe, described_model, left_out, name_of, read_entry, refuse_other_arms
 from ..io.dataset_errors import dataset_errors_of
+from ..io.muscle_activity import channel_faults
 from ..io.samples import NUMBER, header_of
 from ..io.trial import Reading, Trial, moving_bases, still_angles
 from ..model import Description, Model, TrialEntry
@@ -35,6 +37,8 @@ _LONG = 3.0
 """Length of a segment from which on its unit is doubtful [m]."""
 _SAME_RATE = 0.02
 """Relative difference of two sampling rates up to which they count as the same."""
+_SHORT = 0.7
+"""Share of the median length of the other repeats below which a repeat is reported as short."""
 
 
 @dataclass(frozen=True)
@@ -148,20 +152,23 @@ def check_dataset(source: str | os.PathLike[str], *, progress: Callable[[str, fl
     if description.model is None:
         problems.append(_warned(NO_MODEL))
     dataset = Dataset(name_of(path, description), model, tuple(trials), force_on=description.force_on, tolerance=description.tolerance)
-    problems += [_warned(line) for line in (*still_angles(dataset.trials), *moving_bases(dataset.trials))]
+    problems += [_warned(line) for line in (*still_angles(dataset.trials), *moving_bases(dataset.trials), *channel_faults(dataset.trials))]
     tell("sensors and units", 0.2)
-    _plausible(dataset, problems)
+    stretched = stretched_joint(dataset.trials)
+    _plausible(dataset, problems, stretches=stretched is not None)
     tell("conventions", 0.4)
     _balanced(dataset, problems)
     problems += _without_robot(dataset)
     tell("clocks", 0.6)
-    problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset)]
+    problems += [*_clocks(dataset, [p.text for p in problems if p.level == "error"]), *_rates(dataset), *_short_repeats(dataset)]
     blocked = any(p.level == "error" for p in problems)
     whole = dataset.replace(folder=path.parent, added=description.added, subject=description.subject)
     other = _other_arm(whole)
     problems += other
     tell("passive moments", 0.8)
-    return Checked(_feasible(dict.fromkeys(_not_implied(problems)), whole), _abilities(whole, blocked, bool(other)), whole)
+    of_stretches = () if stretched is None else (_spasticity(whole, stretched, blocked),)
+    verbs = (*of_stretches, *_abilities(whole, blocked, bool(other)))
+    return Checked(_feasible(dict.fromkeys(_not_implied(problems)), whole), verbs, whole)
 
 
 def _despite_faults(source: Path, problems: list[Problem]) -> None:
@@ -235,6 +242,8 @@ _WARNINGS = (
         "times the masses",
         "correct the unit of the forces and import again, or body mass (armrs init) or masses (model.toml)",
     ),
+    ("a dead channel", "check electrodes and cable and record again, or remove the column"),
+    (", its repeats ", "record this repeat again, or nothing if it was ended on purpose"),
     ("saturated", "record with a larger range of the sensor, or leave these trials out"),
     ("hand and handle", "check the bases and lengths of arm and robot in the model, and the zeros of their angles"),
     ("no samples from", "fill the gap or record the movement again; where it was, nothing is compared"),
@@ -344,8 +353,8 @@ def _joints_of(path: Path) -> int:
     return max((int(found[1]) for name in header if (found := re.match(r"q([1-9])_", name))), default=1)
 
 
-def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
-    """Check each trial by itself, so that one dead sensor does not hide another."""
+def _plausible(dataset: Dataset, problems: list[Problem], *, stretches: bool) -> None:
+    """Check each trial by itself, so that one dead sensor does not hide another; stretches need no test trial."""
     for trial in dataset.trials:
         one = dataset.replace(trials=(trial,))
         dead = list(plausibility.dead_forces(one))
@@ -354,6 +363,8 @@ def _plausible(dataset: Dataset, problems: list[Problem]) -> None:
             _caught(partial(plausibility.refuse_implausible, one), problems)
     led = _is_led(dataset)
     for test in data_checks.tests():
+        if stretches and test is data_checks.no_test_trial:
+            continue
         problems += [_warned(line) for line in _caught(partial(test, dataset, led), problems) or ()]
 
 
@@ -401,6 +412,18 @@ def _rates(dataset: Dataset) -> Iterator[Problem]:
         if abs(rate / usual - 1.0) > _SAME_RATE:
             said = f"{trial.file}: {rate:.4g} samples a second, where others have {usual:.4g}"
             yield Problem("warning", said, "record all trials at one rate; lost samples?")
+
+
+def _short_repeats(dataset: Dataset) -> Iterator[Problem]:
+    """Give the repeats that are much shorter than the others of their movement."""
+    lengths = [float(trial.t[-1] - trial.t[0]) for trial in dataset.trials]
+    for trial, length in zip(dataset.trials, lengths, strict=True):
+        others = [
+            n for other, n in zip(dataset.trials, lengths, strict=True) if other is not trial and other.configuration == trial.configuration
+        ]
+        usual = float(np.median(others)) if others else 0.0
+        if length < _SHORT * usual:
+            yield _warned(f"{trial.file} lasts {length:.1f} s, its repeats {usual:.1f} s")
 
 
 def _of_file(problem: Problem) -> tuple[str, str]:
@@ -471,6 +494,16 @@ def _abilities(dataset: Dataset, blocked: bool, other_arm: bool) -> tuple[Abilit
         passive,
         Ability("gap", bool(efforts), f"{how}{'; without ' + ' and '.join(lacking) if lacking else ''}"),
     )
+
+
+def _spasticity(dataset: Dataset, joint: int, blocked: bool) -> Ability:
+    """Return whether `spasticity` can use stretches of a joint, from 1."""
+    if blocked:
+        return Ability("spasticity", False, "correct the errors above first")
+    if not any(t.force_on_arm is not None or t.tau is not None for t in dataset.trials):
+        return Ability("spasticity", False, "no forces and no torques")
+    name, n = dataset.model.joints[joint - 1].name, len(dataset.trials)
+    return Ability("spasticity", True, f"{how_many(n, 'stretch', 'stretches')} of the {name} at several speeds")
 
 
 def _passive(dataset: Dataset) -> Ability:

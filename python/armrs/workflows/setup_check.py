@@ -47,8 +47,12 @@ _OTHER_WEIGHT, _MUCH_HEAVIER = 2.0, 0.1
 within both (factors 0.85 to 1.10)."""
 _FEW = 3
 """Movements from which on their differences, and not those of trials, are the scatter of the weight."""
-_UNITS = {"lbf": 4.4482216, "kgf": 9.80665, "kN": 1000.0}
-"""Other units of force [N]."""
+OTHER_UNITS = tuple(
+    (ratio, f"forces stated in {wrong} that are {right}")
+    for unit, newtons in (("lbf", 4.4482216), ("kgf", 9.80665), ("kN", 1000.0))
+    for ratio, wrong, right in ((newtons, unit, "N"), (1.0 / newtons, "N", unit))
+)
+"""Factors of forces in another unit than stated, and the mistake in words."""
 _SAME_UNIT = 0.3
 """A factor this close to that of a unit suggests it: literature and springs are wrong by as much."""
 _STEPS = (np.radians(10.0), np.radians(1.0))
@@ -171,12 +175,7 @@ class Weight:
     def __str__(self) -> str:
         factor = plus_minus(self.factor, self.std)
         found = f"the movements ask for {factor} times the masses and first moments of the model, in all segments"
-        units = [
-            f"forces stated in {wrong} that are {right}"
-            for unit, newtons in _UNITS.items()
-            for ratio, wrong, right in ((newtons, unit, "N"), (1.0 / newtons, "N", unit))
-            if abs(self.factor / ratio - 1.0) < _SAME_UNIT
-        ]
+        units = [words for ratio, words in OTHER_UNITS if abs(self.factor / ratio - 1.0) < _SAME_UNIT]
         causes = " or ".join([*units, "a wrong body mass", "a mass that the model lacks"])
         return f"{found}, {self.apart:.1f} standard deviations from one, the model's own uncertainty counted: {causes}?"
 

@@ -52,8 +52,8 @@ def examine(dataset: Dataset, led: bool) -> list[str]:
 def tests() -> tuple[Callable[[Dataset, bool], list[str]], ...]:
     """Return the tests of `examine`, each by itself: of a data set and whether a robot leads the arm, lines or a refusal."""
     return (
-        _without_the_robot, _few_trials, _dead_sensors, _copies, _wrong_setup, _off_handle, _other_weight, _still_joints, _moving_starts,
-        unresolved, _uneven_repeats, _saturated,
+        _without_the_robot, _few_trials, no_test_trial, _dead_sensors, _copies, _wrong_setup, _off_handle, _other_weight, _still_joints,
+        _moving_starts, unresolved, _uneven_repeats, _saturated,
     )  # fmt: skip
 
 
@@ -66,9 +66,12 @@ def _few_trials(dataset: Dataset, led: bool) -> list[str]:
         lines.append(
             "no movement was repeated: what is noise and what is missing cannot be distinguished; names after the first are guesses"
         )
-    if not dataset.test_trials:
-        lines.append('no trial with role = "test": the gap cannot be measured on data outside the fit')
     return lines
+
+
+def no_test_trial(dataset: Dataset, led: bool) -> list[str]:
+    """Return that there is nothing to measure the gap on."""
+    return [] if dataset.test_trials else ['no trial with role = "test": the gap cannot be measured on data outside the fit']
 
 
 def _dead_sensors(dataset: Dataset, led: bool) -> list[str]:

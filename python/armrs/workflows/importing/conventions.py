@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...analysis.torque_balance import BALANCED, Motion, motion_of, unexplained
 from ...errors import BadInput, Text
 from ...io.column_conventions import AlternativeConvention
 from ...model import Model
+from ..setup_check import OTHER_UNITS
 from .recipe import REFERENCES, ZEROS, Convention
 
 _CLEAR = 1.3
@@ -24,6 +25,10 @@ _CLOSE = 1.1
 """The usual convention is kept when it leaves at most this many times what the best does."""
 _UNEXPLAINED = 0.6
 """With more than this unexplained, no convention fits."""
+_OTHER_UNIT = 3.0
+"""Another unit of the forces is suggested that balances the arm and leaves so many times less than the stated one."""
+_SAMPLES_OF_UNIT = 160
+"""Samples with which units are compared."""
 _CONTRADICTED, _BY = 0.04, 2.0
 """What is stated is refused when it leaves at least this share, and so many times what the best convention leaves."""
 OF_MARKERS = "of markers"
@@ -123,10 +128,19 @@ def decide(
     elif best.unexplained > _UNEXPLAINED:
         said = Text(f"{100 * best.unexplained:.0f} % of the contact torques unexplained by the best convention ({best.convention.words()})")
         allowed = f"at most {100 * _UNEXPLAINED:.0f} %"
-        problems.append(BadInput("angles and forces", said, allowed, hint="wrong lengths, units or force axes?"))
+        problems.append(
+            BadInput("angles and forces", said, allowed, hint=_unit(model, motion, given, best) or "wrong lengths, units or force axes?")
+        )
     elif rivals and best is not usual and rivals[0].unexplained < _CLEAR * best.unexplained:
         both = Text(f"two conventions that explain the forces equally well: {best.convention.words()}; or {rivals[0].convention.words()}")
-        problems.append(BadInput("angles and forces", both, "one; state it with --angles, --zero, --clockwise or --force-on"))
+        problems.append(
+            BadInput(
+                "angles and forces",
+                both,
+                "one; state it with --angles, --zero, --clockwise or --force-on",
+                hint=_unit(model, motion, given, best),
+            )
+        )
     elif best.unexplained > BALANCED:
         doubts.append(
             f"gravity, inertia and passive joints leave {100 * best.unexplained:.3g} % of the contact torques unexplained, more than "
@@ -137,6 +151,23 @@ def decide(
     next_best = f", the next best {100 * rivals[0].unexplained:.0f} %" if rivals else ""
     why = f"the balance leaves {100 * best.unexplained:.0f} % of the contact torques unexplained{next_best}"
     return Convention(c.reference, c.zero, c.signs, c.force_on, why)
+
+
+def _unit(model: Model, motion: Motion | None, given: Mapping[str, object], best: Balance) -> str | None:
+    """Return the unit of the forces in which the arm balances much better, None where there is none."""
+    if motion is None:
+        return None
+    thin = max(1, len(motion.q) // _SAMPLES_OF_UNIT)
+    few = Motion(*(values[::thin] for values in vars(motion).values()))
+    tried = [
+        (balance(model, replace(few, force=few.force / ratio), c).unexplained, words)
+        for ratio, words in OTHER_UNITS
+        for c in candidates(model.n_joints, given, has_force=True)
+    ]
+    left, words = min(tried)
+    if left > BALANCED or _OTHER_UNIT * left > best.unexplained:
+        return None
+    return f"{words}? Then {100 * left:.2g} % are unexplained, as stated {100 * best.unexplained:.2g} %"
 
 
 def _contradicted(model: Model, motion: Motion | None, given: Mapping[str, object], best: Balance) -> BadInput | None:
