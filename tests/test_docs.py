@@ -48,7 +48,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
         elif name.endswith(".toml") and " " not in name:
             (folder / name).write_text(content, encoding="utf-8")
     run = armrs.simulate(folder / "model.toml", armrs.load_movement(folder / "swing.toml", 2))
-    table = {"t_s": run.t, "emg_biceps": np.zeros(len(run.t))}
+    table = {"t_s": run.t, "emg_biceps": np.random.default_rng(1).standard_normal(len(run.t))}
     table |= {f"q{j + 1}_deg": np.degrees(run.q[:, j]) for j in range(2)}
     table |= {f"F{axis}_N": -run.force_on_arm[:, k] for k, axis in enumerate("yz")}  # on the robot
     table |= {f"qr{j + 1}_rad": run.columns["robot_q"][:, j] for j in range(2)}
