@@ -85,7 +85,7 @@ def test_what_a_history_allows_for_markers_is_what_misplaced_markers_do() -> Non
     found = []
     for _ in range(60):
         curve = next(c for c in armrs.passive_moments(misplaced(data, draw)).curves if c.joint == 2)
-        found.append((curve._means("half_width").mean(), curve.stiffness().mean()))
+        found.append((curve.means("half_width").mean(), curve.stiffness().mean()))
     # The standard deviation of 60 draws is itself known to 9 %.
     np.testing.assert_allclose([told["half_width"], told["stiffness"]], np.std(found, axis=0, ddof=1), rtol=0.3)
 
