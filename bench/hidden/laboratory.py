@@ -14,10 +14,11 @@ import argparse
 import dataclasses
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from mujoco_world.sizes import SIZES
 
 from armrs.model import Effect, Model
 from armrs.montecarlo.sweep_file import load_sweep
@@ -31,31 +32,23 @@ LAWS = {"elastic": ("stiffness", "rest"), "viscous": ("viscosity",), "coulomb": 
 """Laws of a joint, by the values in the true model; the size of each is the first."""
 NAMES = {"coulomb": "torque"}
 """What the parameter of an effect is called where a joint calls it otherwise."""
-SIZES: dict[str, tuple[tuple[tuple[float, float], ...], tuple[tuple[float, float], ...]]] = {
-    "coulomb": (((0.15, 0.35), (0.08, 0.18), (0.03, 0.06)), ((0.05, 0.09), (0.025, 0.04), (0.01, 0.018))),
-    "quadratic_drag": (((0.5, 0.9), (0.3, 0.6), (0.15, 0.3)), ((0.2, 0.3), (0.1, 0.15), (0.05, 0.08))),
-    "cubic_elastic": (((4.0, 8.0), (3.0, 6.0), (4.0, 8.0)), ((1.5, 2.5), (1.0, 1.8), (1.5, 2.5))),
-    "relaxation": (((1.2, 2.5), (1.2, 2.5), (0.8, 1.6)), ((0.4, 0.7), (0.3, 0.5), (0.2, 0.35))),
-    "constant_moment": (((1.0, 2.0), (0.6, 1.2), (0.15, 0.3)), ((0.4, 0.6), (0.2, 0.3), (0.05, 0.08))),
-    "biarticular": (((0.5, 1.0), (0.5, 1.0), (0.2, 0.4)), ((0.15, 0.25), (0.15, 0.25), (0.06, 0.1))),
-    "stretch_reflex": (((0.7, 1.2), (0.4, 0.7), (0.2, 0.4)), ((0.25, 0.4), (0.1, 0.16), (0.08, 0.12))),
-}
-"""Hidden effects, and their first parameter [SI] in shoulder, elbow and wrist, strong and medium: the sizes of the MuJoCo world."""
+KINDS = ("coulomb", "quadratic_drag", "cubic_elastic", "relaxation", "constant_moment", "biarticular", "stretch_reflex")
+"""Hidden effects, of the sizes of the MuJoCo world."""
 POSTURE = (-1.05, 1.05, 0.0)
 """About which the movements lead the arm [rad]."""
 KEPT = ("dataset.toml", "model.toml", "trials")
 
 
+def told(kind: str, joint: int | None, parameters: Mapping[str, float], exact: Collection[str]) -> dict[str, object]:
+    """Return an effect as `truth.json` has it; other parameters than the exact ones are of a shape that need not be met."""
+    own = {name: {"value": value, "exact": name in exact} for name, value in parameters.items()}
+    return {"kind": kind, "joint": joint, "channel": None, "trial": None, "parameters": own}
+
+
 def truth(model: Model) -> list[dict[str, object]]:
     """Return the laws that act in the joints of the true arm."""
     return [
-        {
-            "kind": kind,
-            "joint": number,
-            "channel": None,
-            "trial": None,
-            "parameters": {NAMES.get(name, name): {"value": getattr(joint, name), "exact": True} for name in names},
-        }
+        told(kind, number, own := {NAMES.get(name, name): getattr(joint, name) for name in names}, own)
         for number, joint in enumerate(model.joints, start=1)
         for kind, names in LAWS.items()
         if getattr(joint, names[0])
@@ -77,12 +70,6 @@ def hidden(kind: str, strength: str, draw: np.random.Generator) -> Effect:
         "stretch_reflex": {"gain": size, "threshold": float(draw.uniform(0.1, 0.4)), "direction": float(draw.choice([-1.0, 1.0]))},
     }
     return Effect(kind, joint + 1, parameters=others[kind])
-
-
-def told(effect: Effect) -> dict[str, object]:
-    """Return an effect as `truth.json` has it; shapes of its law need not be met."""
-    own = {name: {"value": value, "exact": k == 0} for k, (name, value) in enumerate(effect.parameters.items())}
-    return {"kind": effect.kind, "joint": effect.joint, "channel": None, "trial": None, "parameters": own}
 
 
 def prepared(experiment: Experiment, effects: Sequence[Effect]) -> Experiment:
@@ -108,11 +95,11 @@ def main() -> None:
         experiment = dataclasses.replace(sweep, seed=seed).drawn(1)
         effects = truth(experiment.truth)
         if options.family in FAMILIES:
-            draw, kinds = np.random.default_rng(seed), list(SIZES)
+            draw = np.random.default_rng(seed)
             # Numbers that follow each other go round all kinds.
-            own = [kinds[(seed + 3 * k) % len(kinds)] for k in range(FAMILIES[options.family])]
+            own = [KINDS[(seed + 3 * k) % len(KINDS)] for k in range(FAMILIES[options.family])]
             added = [hidden(kind, options.strength, draw) for kind in own]
-            experiment, effects = prepared(experiment, added), [told(effect) for effect in added]
+            experiment, effects = prepared(experiment, added), [told(e.kind, e.joint, e.parameters, [*e.parameters][:1]) for e in added]
         folder = options.folder / f"l{seed}"
         shutil.rmtree(folder, ignore_errors=True)
         record(experiment, folder / "all")

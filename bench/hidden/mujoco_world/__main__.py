@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from effects import FURTHER, OUTSIDE, SIZES, Hidden, hide, in_joint, laws, outside, several
+from effects import FURTHER, OUTSIDE, Hidden, hide, in_joint, laws, outside, several
 from engine import RECORD, Rig, Torque, run
+from sizes import SIZES
 from subject import Json, Random, Subject, Trial, normal, robot_angles, subject, trials, within
 
 TOLERANCE = {"angle_offset_deg": 0.3, "force_bias_N": 0.2, "force_gain": 0.01, "time_delay_s": 0.005, "handle_placement_m": 0.001}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from engine import Burst, Cord, Law, Maxwell, Reflex, Rig, Tremor
+from sizes import SIZES
 from subject import Random, Subject, Trial, within
 
 
@@ -28,33 +29,8 @@ class Hidden:
     late: float = 0.0
 
 
-# ---- what is hidden: sizes [SI] at shoulder, elbow, wrist when strong and when medium
+# ---- what is hidden
 
-SIZES: dict[str, tuple[tuple[tuple[float, float], ...], tuple[tuple[float, float], ...]]] = {
-    "viscous": (((0.4, 0.8), (0.3, 0.6), (0.1, 0.2)), ((0.15, 0.25), (0.1, 0.15), (0.04, 0.06))),
-    "coulomb": (((0.15, 0.35), (0.08, 0.18), (0.03, 0.06)), ((0.05, 0.09), (0.025, 0.04), (0.01, 0.018))),
-    "stribeck": (((0.25, 0.5), (0.12, 0.25), (0.05, 0.1)), ((0.09, 0.14), (0.04, 0.07), (0.015, 0.025))),
-    "quadratic_drag": (((0.5, 0.9), (0.3, 0.6), (0.15, 0.3)), ((0.2, 0.3), (0.1, 0.15), (0.05, 0.08))),
-    "elastic": (((1.2, 2.5), (1.2, 2.5), (0.8, 1.6)), ((0.4, 0.7), (0.4, 0.7), (0.3, 0.5))),
-    "cubic_elastic": (((4.0, 8.0), (3.0, 6.0), (4.0, 8.0)), ((1.5, 2.5), (1.0, 1.8), (1.5, 2.5))),
-    "relaxation": (((1.2, 2.5), (1.2, 2.5), (0.8, 1.6)), ((0.4, 0.7), (0.3, 0.5), (0.2, 0.35))),
-    "constant_moment": (((1.0, 2.0), (0.6, 1.2), (0.15, 0.3)), ((0.4, 0.6), (0.2, 0.3), (0.05, 0.08))),
-    "biarticular": (((0.5, 1.0), (0.5, 1.0), (0.2, 0.4)), ((0.15, 0.25), (0.15, 0.25), (0.06, 0.1))),
-    "stretch_reflex": (((0.7, 1.2), (0.4, 0.7), (0.2, 0.4)), ((0.25, 0.4), (0.1, 0.16), (0.08, 0.12))),
-    "tremor": (((0.15, 0.3), (0.08, 0.16), (0.03, 0.06)), ((0.05, 0.08), (0.025, 0.04), (0.01, 0.015))),
-    "voluntary": (((1.5, 3.0), (0.8, 1.5), (0.2, 0.4)), ((0.5, 0.8), (0.3, 0.45), (0.07, 0.12))),
-    "motor_inertia": (((0.15, 0.3), (0.05, 0.1), (0.008, 0.016)), ((0.05, 0.08), (0.015, 0.025), (0.003, 0.005))),
-    "added_mass": (((0.4, 0.8),), ((0.2, 0.3),)),
-    "gravity_tilt": (((0.06, 0.12),), ((0.025, 0.04),)),
-    "shoulder_heave": (((0.004, 0.012),), ((0.0015, 0.003),)),
-    "contact_compliance": (((7e-5, 1.8e-4),), ((2.6e-5, 4.4e-5),)),
-    "force_bias": (((3.0, 6.0),), ((1.4, 2.2),)),
-    "force_drift": (((0.08, 0.2),), ((0.03, 0.05),)),
-    "force_gain": (((0.2, 0.35),), ((0.11, 0.15),)),
-    "force_misalignment": (((0.042, 0.105),), ((0.016, 0.026),)),
-    "angle_offset": (((0.08, 0.14),), ((0.038, 0.058),)),
-    "time_delay": (((0.04, 0.08),), ((0.018, 0.027),)),
-}
 FAMILY = {
     **dict.fromkeys(("viscous", "coulomb", "stribeck", "quadratic_drag"), "dissipation"),
     **dict.fromkeys(("elastic", "cubic_elastic", "relaxation", "constant_moment", "biarticular"), "elasticity"),

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..io.dataset import Dataset
-from ..io.plausibility import hand_path, handle_path
+from ..io.plausibility import hand_off_handle, hand_path, handle_path
 from ..io.trial import Trial
 from ..model import Model
 from .uncertainty import LENGTH_STD, Deviations
@@ -147,7 +147,7 @@ def find(dataset: Dataset) -> JointCentres:
     if misplaced.possible and misplaced.cost - others[0].cost < _LEAST_GAIN:
         return _of(prior, misplaced)
     told = [fit for fit in others if fit.possible and fit.cost < others[0].cost + _UNDECIDED]
-    apart = float(np.sqrt(np.mean(np.sum(np.concatenate([_apart(model, t) for t in seen]) ** 2, axis=1))))
+    apart = float(np.sqrt(np.mean(np.sum(np.concatenate([hand_off_handle(model, model.robot, t) for t in seen]) ** 2, axis=1))))
     causes = tuple(fit.named() for fit in told)
     arm = [fit for fit in told or others if fit.cause is not None and fit.cause.of_arm]
     if told and not arm:
@@ -363,10 +363,3 @@ def _turned(q: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     absolute = np.cumsum(q, axis=1)
     each = np.stack([-np.sin(absolute), np.cos(absolute)], axis=1) * lengths
     return np.asarray(np.cumsum(each[:, :, ::-1], axis=2)[:, :, ::-1])
-
-
-def _apart(model: Model, trial: Trial) -> np.ndarray:
-    """Return how far hand and handle are from each other, (n, 2) [m]."""
-    assert model.robot is not None and trial.robot_q is not None
-    good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
-    return hand_path(model, trial.q[good]) - handle_path(model.robot, trial.robot_q[good])

@@ -10,6 +10,7 @@ import numpy as np
 from .. import _armrs
 from ..errors import BadInput, Text
 from ..io.dataset import Dataset
+from ..io.muscle_activity import is_constant
 from ..io.trial import Trial
 from .passive_curve import PassiveCurve
 
@@ -59,7 +60,7 @@ def muscles_silent(trials: Sequence[Trial]) -> Check:
     for trial in trials:
         width = max(1, round(WINDOW * trial.rate))
         for name, values in trial.emg.items():
-            if np.isfinite(values).any() and np.nanmin(values) == np.nanmax(values):
+            if is_constant(values):
                 constant.add(name)
             judged = np.isfinite(values) & ~trial.active
             size = np.abs(values[judged])

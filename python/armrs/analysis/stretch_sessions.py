@@ -10,7 +10,7 @@ from ..io.trial import Trial
 from .stretch_reflex import FEWEST
 
 LEAST_RANGE = np.radians(20.0)
-"""Range of a stretch [rad]."""
+"""Range that a stretch needs to reach a speed and leave it again [rad]."""
 HELD = 0.2
 """Share of that range up to which the other joints count as held."""
 LEAST_SPEEDS = 2.0

@@ -90,11 +90,17 @@ def channel_faults(trials: Sequence[Trial]) -> list[str]:
     for name in dict.fromkeys(name for trial in trials for name in trial.emg):
         read = [(trial.file, trial.original.get(name, trial.emg[name])) for trial in trials if name in trial.emg]
         there = [(file, values[np.isfinite(values)]) for file, values in read]
-        dead = [file for file, values in there if values.size and np.ptp(values) == 0.0]
+        dead = [file for file, values in there if is_constant(values)]
         if dead:
             lines.append(f"{first_of(dead)}: {name} is constant: a dead channel?")
         lines += _clipped(name, [(file, values) for file, values in there if file not in dead])
     return lines
+
+
+def is_constant(values: np.ndarray) -> bool:
+    """Whether a channel was measured and has one value throughout: a dead sensor, and no silent muscle."""
+    there = values[np.isfinite(values)]
+    return bool(there.size and np.ptp(there) == 0.0)
 
 
 def _clipped(name: str, columns: Sequence[tuple[str, np.ndarray]]) -> list[str]:

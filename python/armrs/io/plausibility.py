@@ -173,11 +173,15 @@ def _gaps(dataset: Dataset) -> Iterator[np.ndarray]:
     """Give how far the hand is from the handle in each trial whose robot angles are known, (n, 2) [m]."""
     model, robot = dataset.model, dataset.model.robot
     for trial in dataset.trials:
-        if robot is None or trial.robot_q is None:
-            continue
-        good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
-        if good.any():
-            yield hand_path(model, trial.q[good]) + _displacement(model, trial)[good] - handle_path(robot, trial.robot_q[good])
+        if robot is not None and trial.robot_q is not None and len(gap := hand_off_handle(model, robot, trial)):
+            yield gap
+
+
+def hand_off_handle(model: Model, robot: Robot, trial: Trial) -> np.ndarray:
+    """Return how far the hand is from the handle in a trial with robot angles, where all angles are known, (n, 2) [m]."""
+    assert trial.robot_q is not None
+    good = np.isfinite(trial.q).all(axis=1) & np.isfinite(trial.robot_q).all(axis=1)
+    return hand_path(model, trial.q[good]) + _displacement(model, trial)[good] - handle_path(robot, trial.robot_q[good])
 
 
 def _displacement(model: Model, trial: Trial) -> np.ndarray:

@@ -29,6 +29,8 @@ _Key = tuple[str, str, int, str]
 """Name, kind, joint (0 for none) and unit of a parameter."""
 _Row = tuple[str, str, int, str, str, float, float, int, str]
 """Key, date, value, standard deviation, session and side."""
+_Decided = Mapping[tuple[int, int], set[tuple[str, str]]]
+"""Names and kinds of what the data decided, by session and joint."""
 _NO_TEST = (np.nan, np.nan, np.nan)
 
 
@@ -225,51 +227,39 @@ def history_of(connection: sqlite3.Connection, method: str, subject: str | None,
     known = [row for row in rows if (row[4], row[7]) <= (date, session)]
     same = [row for row in known if row[8] == side]
     there = [row for row in known if side and row[8] == arm_side.other(side)]
-    points, beside = _by_parameter(same)
+    points, elsewhere = _by_parameter(same), _by_parameter(there)
     followed = {key: own_points for key, own_points in points.items() if own_points[-1][3] == session}
-    courses = _courses(followed, _comparable(followed, beside, method), _last_of_each(there, followed, beside, method))
+    decided = _decided(known) if method in _TOGETHER else None
+    alike = [_comparable(own_points, own_points[-1], key[2], decided) for key, own_points in followed.items()]
+    others = [
+        [*_comparable(elsewhere.get(key, ()), own_points[-1], key[2], decided)[-1:], own_points[-1]] for key, own_points in followed.items()
+    ]
+    courses = _courses(followed, alike, others)
     later = tuple(dict.fromkeys(row[4] for row in rows if row[8] == side and (row[4], row[7]) > (date, session)))
     warnings = (*_in_other_units(points, followed), *_without_side(rows, side), *_not_last(date, later))
     return History(subject, courses, warnings, date, side or None, later)
 
 
-def _by_parameter(rows: Iterable[_Row]) -> tuple[dict[_Key, list[_Point]], dict[tuple[int, int], set[tuple[str, str]]]]:
-    """Return the points of each parameter, and what the data decided of a joint in a session."""
+def _by_parameter(rows: Iterable[_Row]) -> dict[_Key, list[_Point]]:
     points: dict[_Key, list[_Point]] = {}
-    beside: dict[tuple[int, int], set[tuple[str, str]]] = {}
     for name, kind, joint, unit, date, value, std, session, _ in rows:
         points.setdefault((name, kind, joint, unit), []).append((date, value, std, session))
-        beside.setdefault((session, joint), set()).add((name, kind))
-    return points, beside
+    return points
 
 
-def _comparable(
-    followed: Mapping[_Key, Sequence[_Point]], beside: Mapping[tuple[int, int], set[tuple[str, str]]], method: str
-) -> list[list[_Point]]:
-    """Return the points of each parameter that compare with the last one.
+def _decided(rows: Iterable[_Row]) -> _Decided:
+    decided: dict[tuple[int, int], set[tuple[str, str]]] = {}
+    for name, kind, joint, *_, session, _ in rows:
+        decided.setdefault((session, joint), set()).add((name, kind))
+    return decided
 
-    Where another parameter of the joint sat at a bound, a deviation of `identify` means less; the others estimate each by itself.
+
+def _comparable(points: Sequence[_Point], last: _Point, joint: int, decided: _Decided | None) -> list[_Point]:
+    """Return the points of a parameter that compare with a last one.
+
+    Where another parameter of the joint sat at a bound, a deviation of `identify` means less. Other methods estimate each by itself.
     """
-    return [
-        [p for p in points if method not in _TOGETHER or beside[p[3], key[2]] == beside[points[-1][3], key[2]]]
-        for key, points in followed.items()
-    ]
-
-
-def _last_of_each(
-    rows: Sequence[_Row],
-    followed: Mapping[_Key, Sequence[_Point]],
-    beside: Mapping[tuple[int, int], set[tuple[str, str]]],
-    method: str,
-) -> list[list[_Point]]:
-    """Return the last point of the other arm, where it compares, before that of each parameter."""
-    points, beside_there = _by_parameter(rows)
-    pairs = []
-    for key, own in followed.items():
-        last = own[-1]
-        found = [p for p in points.get(key, ()) if method not in _TOGETHER or beside_there[p[3], key[2]] == beside[last[3], key[2]]]
-        pairs.append([*found[-1:], last])
-    return pairs
+    return [p for p in points if decided is None or decided[p[3], joint] == decided[last[3], joint]]
 
 
 def _courses(

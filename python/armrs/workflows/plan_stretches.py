@@ -10,6 +10,7 @@ import numpy as np
 from .. import checks
 from .._armrs import Prediction
 from ..analysis.stretch_reflex import UNITS, Stretch, spread
+from ..analysis.stretch_sessions import LEAST_RANGE
 from ..errors import BadInput, Text
 from ..model import Model
 from .movement import Movement
@@ -18,8 +19,6 @@ from .spasticity import DEFAULT_CUTOFF, low_pass
 
 SLOWEST = np.radians(15.0)
 """Speed of the slowest stretch [rad/s]: below the threshold of most reflexes, so that it shows what is no reflex."""
-LEAST_RANGE = np.radians(20.0)
-"""Range that a stretch needs to reach a speed and leave it again [rad]."""
 PAUSE = 4.0
 """Rest before each stretch [s]: a reflex is weaker soon after another one (Hufschmidt and Mauritz 1985)."""
 LEAST_VALUE = 1e-2

@@ -142,12 +142,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         };
         (state.current, state.point) = settled;
         if !is_as_judged(&found, &(state.current.asked.clone(), self.dropped.clone())) {
-            (state.current, state.point, named) = self.judged(
-                (state.current, state.point),
-                &state.calibrated,
-                (state.asked, state.scale, periodic),
-                progress,
-            )?;
+            (state, named) = self.judged(state, periodic, progress)?;
         }
         Ok((state, named, base))
     }

@@ -109,12 +109,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for turn in 1.. {
             let before = kinds(&state.current);
             let named;
-            (state.current, state.point, named) = self.judged(
-                (state.current, state.point),
-                &state.calibrated,
-                (state.asked, state.scale, periodic),
-                progress,
-            )?;
+            (state, named) = self.judged(state, periodic, progress)?;
             if turn < TURNS
                 && let Some(instead) = self.with_base_instead(&state.current, &state.point)?
             {

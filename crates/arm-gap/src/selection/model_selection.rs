@@ -243,18 +243,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// What could stand in the place of each named effect; a better one takes it.
     pub(crate) fn judged(
         &self,
-        (mut fitted, mut point): Settled<'a, N>,
-        calibrated: &FittedHypothesis<N>,
-        (asked, scale, periodic): (f64, f64, Option<[f64; 2]>),
+        mut state: SearchState<'a, N>,
+        periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<
-        (
-            FittedHypothesis<N>,
-            LinearizationPoint<'a, N>,
-            Vec<MissingEffect>,
-        ),
-        GapError,
-    > {
+    ) -> Result<(SearchState<'a, N>, Vec<MissingEffect>), GapError> {
+        let (mut fitted, mut point) = (state.current, state.point);
+        let (asked, scale) = (state.asked, state.scale);
         let mut exchanges = 0;
         'again: loop {
             let mut named = Vec::new();
@@ -303,7 +297,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     // A solution that can be followed but not simulated is refused.
                     if let Ok(settled) = self.settle(better.hypothesis, better.asked) {
                         // Others may have stood for what the former one missed.
-                        (fitted, point) = self.pruned(settled, calibrated, scale)?;
+                        (fitted, point) = self.pruned(settled, &state.calibrated, scale)?;
                         continue 'again;
                     }
                 }
@@ -317,7 +311,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     alternatives: self.ties(alternatives, candidate, gain / scale),
                 });
             }
-            return Ok((fitted, point, named));
+            (state.current, state.point) = (fitted, point);
+            return Ok((state, named));
         }
     }
 
