@@ -39,7 +39,7 @@ def test_documents_count_the_effects_that_are_searched_for() -> None:
     assert f"Y, of {len(searched)} kinds" in (ROOT / "docs/peers.md").read_text()
     hidden = ROOT / "bench" / "hidden"
     cast = re.findall(r'(?:at_joints|anywhere)\(\s*"(\w+)"', (hidden / "src" / "cast" / "sizes.rs").read_text())
-    other = re.search(r"^SIZES.*?^}", (hidden / "mujoco_world" / "effects.py").read_text(), flags=re.M | re.S)
+    other = re.search(r"^SIZES.*?^}", (hidden / "mujoco_world" / "sizes.py").read_text(), flags=re.M | re.S)
     assert other is not None and searched - set(cast) == {"handle_slip", "shoulder_heave"} and set(cast) < searched
     said = (hidden / "README.md").read_text()
     assert f"each of {len(cast)} kinds" in said and f"the {len(searched)} that `armrs gap` searches for" in said
