@@ -62,16 +62,16 @@ def pair(number: int, seed: int, kind: str, counts: dict[str, list[bool]]) -> No
     if laboratory:
         # In faster movements the reflex is in the moments. How far a joint was moved was chosen.
         slow = [c for c in passive if c.joint == 2 and "stretch 0" in c.name and not c.name.startswith("range")]
-        said = {c.name.split(" ")[0] for c in slow if c.changed_since_last}
+        said = {c.name.split(" ")[0] for c in slow if c.before.clear}
         if stiffer != 1.0:
             counts["change of the stiffness seen"].append("stiffness" in said)
         counts["no passive moment called changed that is not"].append(not said - ({"stiffness"} if stiffer != 1.0 else set()))
         stiffness = next(c for c in slow if c.name.startswith("stiffness"))
-        error = stiffness.since_last - (second.stiffness - first.stiffness)
-        counts["interval of the change of stiffness holds"].append(abs(error) <= 1.96 * stiffness.since_last_std)
+        error = stiffness.before.value - (second.stiffness - first.stiffness)
+        counts["interval of the change of stiffness holds"].append(abs(error) <= 1.96 * stiffness.before.std)
     if kind == "passive":
         return
-    called = {c.name for c in courses if c.changed_since_last and c.joint == max(c.joint or 0 for c in courses)}
+    called = {c.name for c in courses if c.before.clear and c.joint == max(c.joint or 0 for c in courses)}
     if factor != 1.0:
         counts["change of the gain seen"].append("gain" in called)
     else:

@@ -33,7 +33,8 @@ def estimate(kind: str, name: str, joint: int, value: float, half: float, decide
 def result(**changes: Any) -> dict[str, Any]:
     """Return an identification as its JSON has it."""
     change = {"kind": "elastic", "name": "stiffness", "joint": 1, "unit": "N m/rad", "dates": ["2026-01-02", "2026-02-02"]}
-    change |= {"values": [0.9, 1.8], "stds": [0.1, 0.1], "changed": True, "since_last_std": 0.14, "changed_since_last": True}
+    change |= {"values": [0.9, 1.8], "stds": [0.1, 0.1], "changed": True}
+    change["before"] = {"date": "2026-01-02", "value": 0.9, "std": 0.14, "p_value": 1e-9, "clear": True}
     return {
         "verb": "identify",
         "data": {
@@ -46,7 +47,7 @@ def result(**changes: Any) -> dict[str, Any]:
             estimate("coulomb", "torque", 1, 0.0, 0.03, "bound"),
             estimate("viscous", "viscosity", 2, 0.1, 0.05, "prior"),
         ],
-        "history": [{**change, "since_last": 0.9}],
+        "history": [change],
         "warnings": [],
         "made_by": {"armrs": "0"},
     } | changes  # fmt: skip
@@ -114,7 +115,7 @@ def test_two_analyses_of_one_quantity_are_one_line(tmp_path: Path) -> None:
 def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic_norms.Norm, ...], tmp_path: Path) -> None:
     """What changed, by how much, whether that is sure and what next are what a therapist asks: it comes before the table."""
     change = result()["history"][0]
-    same = change | {"name": "torque", "kind": "coulomb", "since_last": 0.01, "since_last_std": 0.02, "changed_since_last": False}
+    same = change | {"name": "torque", "kind": "coulomb", "before": {**change["before"], "value": 0.01, "std": 0.02, "clear": False}}
     lines = clinic_lines.lines_of(result(history=[change, same]), norms)
     assert session_changes.change_lines(lines) == [
         "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",

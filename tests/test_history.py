@@ -329,7 +329,7 @@ def test_a_session_that_is_added_later_is_compared_with_the_one_before_it(identi
     found = sessions.add(file, again(moved(identified, {"m2*l2": 4.0 * std}), 3), "2026-02-03")
     course = next(c for c in found.courses if c.name == "m2*l2")
     assert (found.date, course.dates, found.later) == ("2026-02-03", ("2026-01-05", "2026-02-03"), ("2026-03-04", "2026-04-02"))
-    assert course.before.date == course.first.date == "2026-01-05" and course.since_last == pytest.approx(4.0 * std)
+    assert course.before.date == course.first.date == "2026-01-05" and course.before.value == pytest.approx(4.0 * std)
     assert found.warnings == ("history: 2026-02-03 is compared with earlier sessions only, not with 2026-03-04, 2026-04-02",)
     last = next(c for c in sessions.read(file).courses if c.name == "m2*l2")
     assert (last.before.date, last.first.date) == ("2026-03-04", "2026-01-05")
@@ -352,12 +352,12 @@ def test_sessions_compare_with_those_of_the_same_arm_and_with_the_other_one(iden
             number += 1
             found = sessions.add(file, of_side(moved(identified, {"m2*l2": by * std}), side, number), date)
     course = next(c for c in found.courses if c.name == "m2*l2")
-    assert found.side == "right" and course.dates == ("2026-01-05", "2026-02-03") and not course.changed_since_last
-    assert course.since_last == pytest.approx(0.5 * std)
+    assert found.side == "right" and course.dates == ("2026-01-05", "2026-02-03") and not course.before.clear
+    assert course.before.value == pytest.approx(0.5 * std)
     assert course.other_arm.date == "2026-02-03" and course.other_arm.value == pytest.approx(11.5 * std) and course.other_arm.clear
     left = sessions.add(file, of_side(moved(identified, {"m2*l2": 9.0 * std}), "left", 3), "2026-02-03")
     course = next(c for c in left.courses if c.name == "m2*l2")
-    assert course.changed_since_last and course.since_last == pytest.approx(9.0 * std)
+    assert course.before.clear and course.before.value == pytest.approx(9.0 * std)
     assert "is replaced" in left.warnings[-1]
 
 
@@ -365,7 +365,7 @@ def test_a_side_that_is_stated_later_takes_the_place_of_none(identified: Identif
     file = tmp_path / "s.sqlite"
     sessions.add(file, identified, "2026-01-05")
     found = sessions.add(file, of_side(identified, "left", 1), "2026-02-03")
-    assert all(np.isnan(c.since_last) for c in found.courses)
+    assert all(np.isnan(c.before.value) for c in found.courses)
     (line,) = found.warnings
     assert line.startswith("history, side: found none on 2026-01-05, allowed left as in this session: not compared; state it in [subject]")
     (none,) = sessions.add(file, again(identified, 2), "2026-03-01").warnings

@@ -113,7 +113,7 @@ def test_the_verb_writes_a_page_and_keeps_a_history(tmp_path: Path, capsys: pyte
     said = capsys.readouterr().out
     assert "a stretch reflex resists where the angle grows faster than" in said and "since the session before" in said
     courses = json.loads((tmp_path / "1.json").read_text())["history"]
-    changed = {c["name"] for c in courses if c["changed_since_last"]}
+    changed = {c["name"] for c in courses if c["before"]["clear"]}
     assert "gain" in changed and "latency" not in changed
     page = (tmp_path / "o1" / "report.html").read_text()
     assert "Stretches of elbow" in page and "catch angle" in page

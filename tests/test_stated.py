@@ -88,9 +88,9 @@ def test_sentences_write_a_value_and_its_interval_in_one_way() -> None:
 
 def test_what_is_followed_has_the_names_and_units_of_the_page_it_stands_on() -> None:
     """Below a table in degrees and milliseconds stood `stretch_reflex 1 threshold` in rad/s and a latency in seconds."""
-    since = dict.fromkeys(("since_last", "since_last_std", "change", "change_std"), 0.002)
-    tested = {"since_last_p_value": 0.4, "p_value": 1e-14, "changed_since_last": False, "changed": True}
-    reflex = {"kind": "stretch_reflex", "joint": 1, "dates": ["a", "b", "c"], "stds": [0.002] * 3, **since, **tested}
+    before = {"value": 0.002, "std": 0.002, "p_value": 0.4, "clear": False}
+    tested = {"before": before, "change": 0.002, "change_std": 0.002, "p_value": 1e-14, "changed": True}
+    reflex = {"kind": "stretch_reflex", "joint": 1, "dates": ["a", "b", "c"], "stds": [0.002] * 3, **tested}
     threshold = {"name": "threshold", "unit": "rad/s", "values": [1.0, 1.0, 1.002], **reflex}
     table = tables.history([threshold, {**threshold, "name": "latency", "unit": "s", "values": [0.04, 0.04, 0.0393]}])
     assert table.rows == [

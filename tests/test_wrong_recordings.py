@@ -48,7 +48,7 @@ def in_unit(newtons: float) -> armrs.Dataset:
 def changed(first: armrs.Spasticity, second: armrs.Spasticity, folder: Path) -> set[str]:
     """Return what a history of two sessions calls changed."""
     history.add(folder / "h.sqlite", first, "2026-01-03")
-    return {c.name for c in history.add(folder / "h.sqlite", second, "2026-02-03").courses if c.changed_since_last and c.joint == 2}
+    return {c.name for c in history.add(folder / "h.sqlite", second, "2026-02-03").courses if c.before.clear and c.joint == 2}
 
 
 def elbow(found: armrs.Spasticity) -> dict[str, float]:

@@ -218,11 +218,8 @@ def _change(
 
 
 def _difference(course: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
-    """Return a comparison of a course; results of older versions have that with the session before, by other names."""
+    """Return a comparison of a course, where there is one; results of version 0.1.0 have only that with the session before."""
     found = course.get(name)
-    if found is None and name == "before" and len(course["dates"]) > 1:
-        keys = {"value": "since_last", "std": "since_last_std", "clear": "changed_since_last"}
-        found = {key: course.get(old) for key, old in keys.items()} | {"date": course["dates"][-2]}
     known = found is not None and found["value"] is not None and math.isfinite(found["value"])
     return found if known else None
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..io import arm_side
+from ..workflows.courses import LEVEL
 from .clinic_lines import Line
 from .sentences import with_joint_names
 from .session_changes import Change
@@ -121,7 +122,7 @@ def _repeats(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> lis
     needed = [(repeats_needed(change, now), line) for line, change in open_changes if 1.96 * abs(change.value) > change.either_way]
     said = [
         f"{line.joint}, {line.quantity.title.lower()}: about {count:.0f} repeats of each movement instead of {now} would make a change of "
-        "this size certain at 95 %, if the scatter of repeats is what limits it."
+        "this size clear, if the scatter of repeats is what limits it."
         for count, line in sorted(needed, key=lambda n: n[0])[:MOST_STEPS]
         if count <= MOST_REPEATS
     ]
@@ -134,14 +135,14 @@ def _repeats(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> lis
 
 
 def repeats_needed(change: Change, now: int) -> float:
-    """Return with how many repeats in a session a change becomes certain at 95 %; infinite where the other session is too uncertain.
+    """Return with how many repeats in a session a change becomes clear; infinite where the other session is too uncertain.
 
     The variance of this session is taken as that of the mean of its repeats, `s² n / n'` for n' instead of n; that of the other session
     stays. Over all quantities compared the limit is that of Bonferroni, which no step of Holm's exceeds.
     """
     from scipy.stats import norm
 
-    limit = float(norm.ppf(1.0 - 0.025 / max(1, change.compared)))
+    limit = float(norm.ppf(1.0 - 0.5 * LEVEL / max(1, change.compared)))
     both = (change.either_way / 1.96) ** 2
     allowed = (change.value / limit) ** 2 - max(0.0, both - change.own_std**2)
     if allowed <= 0.0:

@@ -68,7 +68,7 @@ def followed(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             values = [in_unit(value, quantity, own) for value in course["values"]]
             stds = [quantity.factor * std for std in course["stds"]]
             drawn = {"name": said, "joint": None, "unit": quantity.unit, "values": values, "stds": stds}
-            found.append({**course, **drawn, "changed": course["changed_since_last"]})
+            found.append({**course, **drawn, "changed": course["before"]["clear"]})
     return found
 
 

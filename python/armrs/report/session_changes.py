@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..formatting import two_digits
+from ..workflows.courses import LEVEL
 
 NO_CHANGE, PERHAPS = "no clear change", "perhaps"
-SURE = "How sure: if nothing had changed, each analysis would still report a change in 1 of 20 sessions."
+SURE = f"How sure: if nothing had changed, each analysis would still report a change in 1 of {1.0 / LEVEL:.0f} sessions."
 EITHER_WAY = "The number after ± is half of a 95 % interval."
 
 

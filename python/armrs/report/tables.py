@@ -319,9 +319,13 @@ def history(courses: Sequence[Mapping[str, Any]]) -> Table:
         several = c["change"] is not None and math.isfinite(c["change"])
         factor, held_in = read_followed(c["unit"])
         cells = []
-        for name, p, changed in (("since_last", "since_last_p_value", "changed_since_last"), ("change", "p_value", "changed")):
-            tested = f"{'yes' if c[changed] else 'no'} (p {_chance(c[p])})" if several else "–"
-            cells += [plus_minus(factor * c[name], factor * c[f"{name}_std"], "+") if several else "–", tested]
+        before = c["before"]
+        for value, std, p, changed in (
+            (before["value"], before["std"], before["p_value"], before["clear"]),
+            (c["change"], c["change_std"], c["p_value"], c["changed"]),
+        ):
+            tested = f"{'yes' if changed else 'no'} (p {_chance(p)})" if several else "–"
+            cells += [plus_minus(factor * value, factor * std, "+") if several else "–", tested]
         last = plus_minus(factor * c["values"][-1], factor * c["stds"][-1])
         rows.append([parameter_label(c), held_in, len(c["dates"]), last, *cells])
     head = ["parameter", "unit", "sessions", "last ± std", "since the session before", "changed", "since all before", "changed"]

@@ -16,8 +16,8 @@ from ..tabular import Tabular, Tidy
 
 _TOGETHER = ("joint", "cascade")
 """Methods that estimate all parameters of a joint together."""
-LEVEL = 0.95
-"""One minus the probability of calling any parameter changed when none is."""
+LEVEL = 0.02
+"""Probability of calling any parameter of an analysis changed when none is; two analyses of a session then stay below 5 %."""
 _ROWS = (
     "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id, coalesce(a.side, '') FROM estimate e "
     "JOIN session s ON s.id = e.session LEFT JOIN arm a ON a.session = s.id "
@@ -56,7 +56,7 @@ class Difference:
     @property
     def clear(self) -> bool:
         """Whether the sessions differ."""
-        return self.p_value < 1.0 - LEVEL
+        return self.p_value < LEVEL
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -103,29 +103,9 @@ class Course:
     other_arm: Difference
 
     @property
-    def since_last(self) -> float:
-        """The last value less that of the session before it; NaN as above."""
-        return self.before.value
-
-    @property
-    def since_last_std(self) -> float:
-        """Its deviation."""
-        return self.before.std
-
-    @property
-    def since_last_p_value(self) -> float:
-        """Its probability over all parameters."""
-        return self.before.p_value
-
-    @property
-    def changed_since_last(self) -> bool:
-        """Whether the last session differs from the one before it."""
-        return self.before.clear
-
-    @property
     def changed(self) -> bool:
         """Whether the last session differs from those before."""
-        return self.p_value < 1.0 - LEVEL
+        return self.p_value < LEVEL
 
     @property
     def label(self) -> str:
@@ -146,10 +126,6 @@ class Course:
             "change_std": self.change_std,
             "p_value": self.p_value,
             "changed": self.changed,
-            "since_last": self.since_last,
-            "since_last_std": self.since_last_std,
-            "since_last_p_value": self.since_last_p_value,
-            "changed_since_last": self.changed_since_last,
             "before": self.before.to_dict(),
             "first": self.first.to_dict(),
             "other_arm": self.other_arm.to_dict(),
