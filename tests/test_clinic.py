@@ -182,9 +182,9 @@ def test_what_is_beyond_its_own_interval_alone_is_called_perhaps() -> None:
 
 
 def test_repeats_that_make_a_change_certain_are_computed_from_its_deviation() -> None:
-    """By hand: with s = 0.1 in both sessions and one quantity, a change of 0.25 needs s²/n' = (0.25/1.96)² − s², n' = 1.6 n."""
-    change = session_changes.Change(0.25, 1.96 * math.hypot(0.1, 0.1), None, False, "2026-01-02", 1, 0.1)
-    assert clinic_next.repeats_needed(change, 10) == math.ceil(10 * 0.01 / ((0.25 / 1.95996) ** 2 - 0.01)) == 16
+    """By hand: with s = 0.1 in both sessions and one quantity, a change of 0.3 needs s²/n' = (0.3/2.33)² − s², n' = 1.5 n."""
+    change = session_changes.Change(0.3, 1.96 * math.hypot(0.1, 0.1), None, False, "2026-01-02", 1, 0.1)
+    assert clinic_next.repeats_needed(change, 10) == math.ceil(10 * 0.01 / ((0.3 / 2.32635) ** 2 - 0.01)) == 16
     # Of several quantities, chance makes one large more easily.
     assert clinic_next.repeats_needed(dataclasses.replace(change, compared=2), 10) > 16
     # The session before alone is too uncertain: no number of repeats helps.
@@ -192,12 +192,12 @@ def test_repeats_that_make_a_change_certain_are_computed_from_its_deviation() ->
 
 
 def test_what_next_is_made_of_the_figures_of_the_result() -> None:
-    found = kept(before=compared(0.25, 0.14, clear=False, date="2026-02-02"))
+    found = kept(before=compared(0.3, 0.14, clear=False, date="2026-02-02"))
     found["data"] |= {"warnings": ["slow_1: joint 1 has missing samples"]}
     lines = clinic_lines.lines_of(found)
     said = clinic_next.next_steps([found], lines)
     assert said[0] == "Correct before the next session: slow_1: shoulder has missing samples."
-    assert said[1].startswith("shoulder, stiffness: about 8 repeats of each movement instead of 5 would make a change of this size certain")
+    assert said[1].startswith("shoulder, stiffness: about 8 repeats of each movement instead of 5 would make a change of this size clear")
     assert said[2] == "Measure the right arm in the same way, into the same history: the page then compares both arms."
     stretches = [{"joint": 2, "configuration": f"v{k}", "speed": 0.3 * k} for k in (1, 2, 3)]
     effect = {"joint": 2, "decided": False, "parameters": {}}
@@ -380,3 +380,26 @@ def test_the_interval_of_a_slow_movement_has_the_errors_of_the_masses() -> None:
     half_width, stiffness = clinic_lines.lines_of(slow_result(("slow", 2, 80.0, True)))
     assert half_width.interval == pytest.approx((0.05, 0.15))
     assert stiffness.interval == pytest.approx((0.7 * math.radians(10.0), 1.3 * math.radians(10.0)))
+
+
+def test_a_movement_in_which_the_reflex_acts_is_not_slow() -> None:
+    """A stretch of 80 °/s above the onset of 46 °/s counted as slow movement, and gave the stiffness of the page."""
+    curve = {"joint": 2, "half_width_mean_Nm": 0.1, "half_width_interval_Nm": [0.05, 0.15], "slow": True}
+    slow, fast = (
+        {**curve, "configuration": "v1", "repeats": 3, "bandwidth_Hz": 0.2},
+        {**curve, "configuration": "v3", "repeats": 4, "bandwidth_Hz": 0.9},
+    )
+    passive = {"verb": "passive", "curves": [slow, fast]}
+    stretches = [{"joint": 2, "configuration": name, "speed": speed} for name, speed in (("v1", 0.3), ("v3", 1.4))]
+    effect = {"joint": 2, "decided": True, "parameters": {"threshold": {"value": 0.8}}}
+
+    def used(**changes: Any) -> str:
+        beside = {"verb": "spasticity", "effects": [effect | changes], "stretches": stretches}
+        found, _ = clinic_lines.without_reflexes([passive, beside])
+        return str((clinic_lines.best_known(found, 2) or {})["configuration"])
+
+    assert used() == "v1"
+    assert used(decided=False) == "v3" and used(joint=1) == "v3"
+    # Of movements with as many repeats the slowest counts.
+    even = {"verb": "passive", "curves": [fast, {**slow, "repeats": 4}]}
+    assert (clinic_lines.best_known(even, 2) or {})["configuration"] == "v1"

@@ -130,9 +130,32 @@ def whole(curve: Mapping[str, Any], quantity: Quantity) -> list[float] | None:
 
 
 def best_known(result: Mapping[str, Any], joint: int) -> Mapping[str, Any] | None:
-    """Return the curve of a joint from the slow movement with an interval and with most repeats."""
+    """Return the curve of a joint from the slow movement with an interval and with most repeats, the slowest of these."""
     own = [c for c in result["curves"] if c["joint"] == joint and c.get("slow", True) and c.get("half_width_mean_Nm") is not None]
-    return max(own, key=lambda c: (None not in (c.get("half_width_interval_Nm") or (None,)), c["repeats"]), default=None)
+
+    def rank(c: Mapping[str, Any]) -> tuple[bool, int, float]:
+        return None not in (c.get("half_width_interval_Nm") or (None,)), c["repeats"], -(c.get("bandwidth_Hz") or math.inf)
+
+    return max(own, key=rank, default=None)
+
+
+def without_reflexes(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return results in which no movement is slow in which the reflex of its joint acts, by the stretches of `spasticity` beside it."""
+    reflexes = [(result, e) for result in results if result["verb"] == "spasticity" for e in result["effects"] if e["decided"]]
+    caught = {
+        (stretch["configuration"], stretch["joint"])
+        for result, effect in reflexes
+        for stretch in result.get("stretches", ())
+        if stretch["joint"] == effect["joint"] and stretch["speed"] > effect["parameters"]["threshold"]["value"]
+    }
+
+    def slow(curve: Mapping[str, Any]) -> bool:
+        return curve.get("slow", True) and (curve["configuration"], curve["joint"]) not in caught
+
+    return [
+        {**result, "curves": [{**curve, "slow": slow(curve)} for curve in result["curves"]]} if "curves" in result else dict(result)
+        for result in results
+    ]
 
 
 def _effect_lines(result: Mapping[str, Any], usual: Mapping[Key, Norm], courses: Mapping[Key, Mapping[str, Any]], bare: bool) -> list[Line]:

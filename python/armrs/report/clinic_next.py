@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..analysis.significance import CHANGE_LEVEL
 from ..io import arm_side
-from ..workflows.courses import LEVEL
 from .clinic_lines import Line
 from .sentences import with_joint_names
 from .session_changes import Change
@@ -142,7 +142,7 @@ def repeats_needed(change: Change, now: int) -> float:
     """
     from scipy.stats import norm
 
-    limit = float(norm.ppf(1.0 - 0.5 * LEVEL / max(1, change.compared)))
+    limit = float(norm.ppf(1.0 - 0.5 * CHANGE_LEVEL / max(1, change.compared)))
     both = (change.either_way / 1.96) ** 2
     allowed = (change.value / limit) ** 2 - max(0.0, both - change.own_std**2)
     if allowed <= 0.0:

@@ -14,7 +14,7 @@ from ..catalogue import catalogue
 from ..errors import BadInput, Text
 from ..io import arm_side
 from . import clinic_trends, html, pages, session_changes
-from .clinic_lines import Line, laboratory, lines_of, once, words_of
+from .clinic_lines import Line, laboratory, lines_of, once, without_reflexes, words_of
 from .clinic_next import failed_checks, faults, next_steps, too_fast
 from .clinic_norms import Norm
 from .sentences import disturbance, is_synthetic, name, together, with_joint_names
@@ -51,6 +51,7 @@ def write_summary(sources: Sequence[str | os.PathLike[str]], path: str | os.Path
             raise BadInput("verb", result["verb"], f"a result of armrs {' or '.join(ANALYSED)}", file=source)
     try:
         _one_session(sources, results)
+        results = without_reflexes(results)
         found = [line for result in results for line in lines_of(result, norms)]
         joints = results[0]["data"]["joints"]
         lines = sorted(once(found), key=lambda line: joints.index(line.joint))

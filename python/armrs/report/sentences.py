@@ -9,8 +9,8 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from .. import formatting
+from ..analysis.significance import CHANGE_LEVEL
 from ..tabular import SYMBOLS as SYMBOLS
-from ..workflows.courses import LEVEL
 from . import console, tables
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ HISTORY_MEANING = (
     "change has the uncertainty of both sessions, from the scatter of their own repeats. Differences between days that are no change of "
     "the joint, such as another strapping of the arm, are not in this scatter. p is the probability of a difference at least as large "
     "without a change, corrected for the number of parameters (Holm). A parameter counts as changed if p is below "
-    f"{100.0 * LEVEL:.0f} %."
+    f"{100.0 * CHANGE_LEVEL:.0f} %."
 )
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: the torque of the contact force minus gravity and inertia, "
@@ -162,7 +162,9 @@ def _followed(result: Mapping[str, Any]) -> str:
     courses = result["courses"]
     changed = [formatting.parameter_label(c) for c in courses if c["changed"]]
     said = f"{', '.join(changed)} changed in the last session" if changed else "No parameter changed in the last session"
-    return f"{len(courses)} parameters are tracked over the sessions. {said} (level of {100.0 * LEVEL:.0f} % for all of them together)."
+    return (
+        f"{len(courses)} parameters are tracked over the sessions. {said} (level of {100.0 * CHANGE_LEVEL:.0f} % for all of them together)."
+    )
 
 
 def _demo(result: Mapping[str, Any]) -> str:

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from ..analysis.significance import CHANGE_LEVEL
 from ..formatting import two_digits
-from ..workflows.courses import LEVEL
 
 NO_CHANGE, PERHAPS = "no clear change", "perhaps"
-SURE = f"How sure: if nothing had changed, each analysis would still report a change in 1 of {1.0 / LEVEL:.0f} sessions."
+SURE = f"How sure: if nothing had changed, each analysis would still report a change in 1 of {1.0 / CHANGE_LEVEL:.0f} sessions."
 EITHER_WAY = "The number after ± is half of a 95 % interval."
 
 

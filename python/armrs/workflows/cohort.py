@@ -16,12 +16,12 @@ import numpy as np
 from .. import checks
 from ..analysis import mixed_model, students_t
 from ..analysis.mixed_model import MixedModel
+from ..analysis.significance import holm
 from ..errors import ArmrsError, BadInput, Text, show, unreadable
 from ..io import arm_side, files, jsonfile
 from ..io.raw import text_table
 from ..result_warnings import with_warnings
 from ..tabular import Tabular, Tidy
-from .courses import holm
 from .history import session_date, without_date
 from .passive import passive_moments
 from .result_data import passive_data

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import sqlite3
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.significance import CHANGE_LEVEL, holm
 from ..errors import show
 from ..formatting import parameter_label
 from ..io import arm_side
 from ..tabular import Tabular, Tidy
 
+if TYPE_CHECKING:
+    import sqlite3
+
 _TOGETHER = ("joint", "cascade")
 """Methods that estimate all parameters of a joint together."""
-LEVEL = 0.02
-"""Probability of calling any parameter of an analysis changed when none is; two analyses of a session then stay below 5 %."""
 _ROWS = (
     "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id, coalesce(a.side, '') FROM estimate e "
     "JOIN session s ON s.id = e.session LEFT JOIN arm a ON a.session = s.id "
@@ -56,7 +57,7 @@ class Difference:
     @property
     def clear(self) -> bool:
         """Whether the sessions differ."""
-        return self.p_value < LEVEL
+        return self.p_value < CHANGE_LEVEL
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
@@ -105,7 +106,7 @@ class Course:
     @property
     def changed(self) -> bool:
         """Whether the last session differs from those before."""
-        return self.p_value < LEVEL
+        return self.p_value < CHANGE_LEVEL
 
     @property
     def label(self) -> str:
@@ -323,13 +324,3 @@ def change(points: Sequence[_Point]) -> tuple[float, float, float]:
     mean_std = float(stds[:-1].min() / np.sqrt(np.sum(weights)))
     difference, std = float(values[-1]) - mean, float(np.hypot(stds[-1], mean_std))
     return difference, std, float(2.0 * norm.sf(abs(difference) / std))
-
-
-def holm(p_values: Sequence[float]) -> list[float]:
-    """Return probabilities over all tests together (Holm 1979); NaN stays."""
-    order = [int(k) for k in np.argsort(p_values) if np.isfinite(p_values[k])]
-    adjusted, largest = [float("nan")] * len(p_values), 0.0
-    for place, k in enumerate(order):
-        largest = max(largest, min(1.0, (len(order) - place) * p_values[k]))
-        adjusted[k] = largest
-    return adjusted

@@ -224,6 +224,7 @@ def passive_moments(
             curve = _curve(dataset, repeats, joint, bins, centres, cutoff)
             if curve is not None:
                 curves.append(curve)
+                warnings += _missing_repeats(repeats, curve)
             elif any(motion_direction.moves(m.q[:, joint]) for m in repeats):
                 lost.append(f"{joint + 1}")
         if lost:
@@ -245,6 +246,27 @@ def passive_moments(
         if (one.joint, one.adjacent) == (other.adjacent, other.joint) and one.joint < other.joint
     )
     return PassiveMoments(trials, tuple(curves), cutoff, tuple(warnings), given, both, fitted, assumptions, centres.lines(given.model))
+
+
+def _missing_repeats(repeats: Sequence[TrialMoments], curve: PassiveCurve) -> list[str]:
+    """Return the repeats that a curve has nothing of, a line each with the reason."""
+    lines = []
+    for m, values in zip(repeats, curve.elastic_repeats, strict=True):
+        # Of a trial in which no joint moves, `_doubtful` says so.
+        if np.isfinite(values).any() or not m.direction.any():
+            continue
+        ways = set(m.direction[:, curve.joint - 1]) - {0}
+        if not motion_direction.moves(m.q[:, curve.joint - 1]):
+            why = f"it moves by less than {np.degrees(motion_direction.LEAST_RANGE):g}°"
+        elif m.trial.active.mean() > 0.5:
+            why = f"muscles are active in {100 * m.trial.active.mean():.0f} % of it"
+        elif len(ways) < 2:
+            way = "the angle only grows" if 1 in ways else "the angle only shrinks"
+            why = f"{way} in what is measured" if ways else "what is measured is too short for the low-pass"
+        else:
+            why = "its two directions share no angles"
+        lines.append(f"{m.trial.file}: not among the repeats of joint {curve.joint}: {why}")
+    return lines
 
 
 def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[TrialMoments, ...], list[str]]:

@@ -162,7 +162,7 @@ pub struct SearchStep {
 }
 
 impl SearchStep {
-    pub(super) fn of(step: &search_state::SearchStep) -> Self {
+    pub(super) fn of(step: &search_state::SearchRound) -> Self {
         let place = |c: &Candidate| placed(c.effect.kind, c.effect.index);
         let tried = step.tried.iter().map(|(members, gain)| Tried {
             effects: members.iter().map(place).collect(),

@@ -12,7 +12,7 @@ use crate::prepared_session::PreparedSession;
 use crate::search::trial_specific_effects::TrialSpecificEffects;
 use crate::selection::model_selection::MissingEffect;
 use crate::selection::passive_base::BaseLaw;
-use crate::selection::search_state::{DetectionLimit, Progress, SearchState, SearchStep, Settled};
+use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, SearchState, Settled};
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 
@@ -30,7 +30,7 @@ pub struct Finding<const N: usize> {
     /// The calibrated and the amended model as they are in each trial; see [`crate::trial_specific::in_trial`].
     pub in_trials: [Vec<Hypothesis<N>>; 2],
     /// Rounds of the search.
-    pub search_trace: Vec<SearchStep>,
+    pub search_trace: Vec<SearchRound>,
     /// How well the amended model is known.
     pub precision: Precision,
     /// Lack of fit of the calibrated and of the amended model.
@@ -42,7 +42,7 @@ pub struct Finding<const N: usize> {
 }
 
 /// What is known of the amended model.
-struct Known<const N: usize> {
+struct AmendedModel<const N: usize> {
     /// The model.
     amended: FittedHypothesis<N>,
     /// Its misfit with the noise that the search had.
@@ -154,11 +154,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (amended, point): Settled<'a, N>,
         named: &mut Vec<MissingEffect>,
         (base, scale): (&[BaseLaw<N>], f64),
-    ) -> Result<Known<N>, GapError> {
+    ) -> Result<AmendedModel<N>, GapError> {
         let alone = self.precision(&point, &amended, scale)?;
         let first = self.session.effects.len();
         let precision = widened(&alone, &amended, named, (first, base));
-        let known = Known {
+        let known = AmendedModel {
             lack: lack_of_fit(self, &point, &amended),
             cost: amended.cost,
             amended,
@@ -170,7 +170,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let before = self.noise.clone();
         let (weighed, other) = self.weighed_by_what_is_left((&known.amended, point))?;
         let Some(slot) = weighed.comes_to_nothing() else {
-            return Ok(Known {
+            return Ok(AmendedModel {
                 amended: weighed,
                 precision: known.precision.with_noise(&alone, other),
                 ..known

@@ -12,7 +12,7 @@ use crate::search::conclusion::Finding;
 use crate::search::trial_specific_effects::TrialSpecificEffects;
 use crate::selection::model_selection::{MissingEffect, mimicked_by_any};
 use crate::selection::score_test::{Choice, ScoreTest};
-use crate::selection::search_state::{DetectionLimit, Progress, SearchState, SearchStep, Settled};
+use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, SearchState, Settled};
 
 /// Most effects that are named.
 const MOST: usize = 6;
@@ -310,7 +310,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         state: &SearchState<'a, N>,
         (library, score_test, room): (&Library, &ScoreTest, usize),
-    ) -> Option<(Settled<'a, N>, SearchStep)> {
+    ) -> Option<(Settled<'a, N>, SearchRound)> {
         let current = &state.current;
         // Less than every effect must explain need not be converged.
         let explained = state.calibrated.cost - current.cost;
@@ -365,7 +365,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         worthy.sort_by(|a, b| b.0.total_cmp(&a.0));
         // A solution that can be followed but not simulated is refused.
         converged.worthy.into_iter().find_map(|(_, better)| {
-            let step = SearchStep {
+            let step = SearchRound {
                 tried: converged.tried.clone(),
                 before: current.cost,
                 after: better.cost,

@@ -10,7 +10,7 @@ use crate::sensitivity::linearization_point::LinearizationPoint;
 
 /// One round of the search.
 #[derive(Clone, Debug)]
-pub struct SearchStep {
+pub struct SearchRound {
     /// What was added, best first: the candidates and what they gained.
     pub tried: Vec<(Vec<Candidate>, f64)>,
     /// Cost before it.
@@ -48,7 +48,7 @@ pub(crate) struct SearchState<'a, const N: usize> {
     pub before: LackOfFit,
     pub current: FittedHypothesis<N>,
     pub point: LinearizationPoint<'a, N>,
-    pub search_trace: Vec<SearchStep>,
+    pub search_trace: Vec<SearchRound>,
     pub detection_limits: Vec<DetectionLimit>,
     /// Number of candidates.
     pub asked: f64,
