@@ -80,17 +80,20 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     if not isinstance(verb, str) or verb not in KINDS:
         found = Text("no key verb") if verb is None else verb
         raise BadInput("verb", found, "a result of armrs " + ", ".join(KINDS), file=path)
-    for course in (c for key in ("history", "courses") for c in data.get(key) or () if isinstance(c, dict)):
-        _renamed(course)
+    for courses in (data.get("history"), data.get("courses")):
+        for course in courses if isinstance(courses, list) else ():
+            _renamed(course)
     return data
 
 
-def _renamed(course: dict[str, Any]) -> None:
+def _renamed(course: Any) -> None:
     """Give the comparison with the session before its name; results of version 0.1.0 have it by others."""
-    if "before" not in course and "changed_since_last" in course:
-        old = {"value": "since_last", "std": "since_last_std", "p_value": "since_last_p_value", "clear": "changed_since_last"}
-        dates = course.get("dates") or ()
-        course["before"] = {"date": dates[-2] if len(dates) > 1 else None} | {key: course.get(name) for key, name in old.items()}
+    if not isinstance(course, dict) or "before" in course or "changed_since_last" not in course:
+        return
+    old = {"value": "since_last", "std": "since_last_std", "p_value": "since_last_p_value", "clear": "changed_since_last"}
+    dates = course.get("dates")
+    before = dates[-2] if isinstance(dates, list) and len(dates) > 1 else None
+    course["before"] = {"date": before} | {key: course.get(name) for key, name in old.items()}
 
 
 def write_report(sources: Sequence[str | os.PathLike[str]], path: str | os.PathLike[str], *, maker: str = "report") -> Path:
