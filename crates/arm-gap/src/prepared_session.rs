@@ -11,7 +11,7 @@ use crate::data::course::{Channels, Course};
 use crate::data::noise::NoiseModel;
 use crate::data::repeats::groups;
 use crate::data::session::Session;
-use crate::data::valid_segments::{ObservableForce, ValidSegments};
+use crate::data::valid_segments::{Observable, ValidSegments};
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::linearization::linear_response::Response;
 use crate::linearization::linearized_run::Linear;
@@ -24,8 +24,8 @@ const AROUND: (f64, f64) = (0.5, 0.5);
 pub(crate) struct Rest {
     /// Samples that are left out.
     pub left_out: Vec<bool>,
-    /// Observable force where it is not both components.
-    pub observable: Arc<Vec<ObservableForce>>,
+    /// Channels where not all are.
+    pub observable: Arc<Vec<Observable>>,
     /// By joint, where it rests in a measured motion; nothing is listed where the motion is simulated.
     pub joints: Vec<Vec<bool>>,
 }

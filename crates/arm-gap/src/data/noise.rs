@@ -12,7 +12,7 @@ use arm_numerics::statistics::autoregressive::{AutoRegression, Whitener, effecti
 
 use crate::GapError;
 use crate::data::course::{Channels, Course};
-use crate::data::valid_segments::{ObservableForce, SHORTEST, ValidSegments};
+use crate::data::valid_segments::{Observable, SHORTEST, ValidSegments};
 use crate::data::whitening::{Observed, Whitening};
 
 /// Highest order of the autoregressions: every segment has as many samples.
@@ -28,8 +28,8 @@ pub struct Thinned {
     pub channels: Channels,
     /// How far each sample is from the one before it; see [`ValidSegments::spacing`].
     pub spacing: Vec<usize>,
-    /// Observable force at each; see [`ValidSegments::force`].
-    pub force: Vec<ObservableForce>,
+    /// Channels at each; see [`ValidSegments::observable`].
+    pub observable: Vec<Observable>,
 }
 
 impl From<Channels> for Thinned {
@@ -39,7 +39,7 @@ impl From<Channels> for Thinned {
         Self {
             channels,
             spacing: vec![1; count],
-            force: Vec::new(),
+            observable: Vec::new(),
         }
     }
 }
@@ -50,7 +50,7 @@ impl Thinned {
         Self {
             channels: valid_segments.pick(channels),
             spacing: valid_segments.spacing(),
-            force: valid_segments.force(),
+            observable: valid_segments.observable(),
         }
     }
 
@@ -58,7 +58,7 @@ impl Thinned {
     pub fn observed(&self) -> Observed<'_> {
         Observed {
             spacing: &self.spacing,
-            force: &self.force,
+            channels: &self.observable,
         }
     }
 
@@ -239,10 +239,10 @@ impl NoiseModel {
 
     /// How the samples of a trial are made white.
     pub fn whitening(&self, valid_segments: &ValidSegments) -> Whitening {
-        let (spacing, force) = (valid_segments.spacing(), valid_segments.force());
+        let (spacing, observable) = (valid_segments.spacing(), valid_segments.observable());
         self.whitening_at(Observed {
             spacing: &spacing,
-            force: &force,
+            channels: &observable,
         })
     }
 

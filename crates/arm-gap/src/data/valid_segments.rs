@@ -16,18 +16,32 @@ pub(crate) const SHORTEST: usize = 4;
 /// Fewest samples of a trial that is compared.
 const FEWEST: usize = 8;
 
-/// Components of the force on the arm that are compared at one sample.
+/// Channels that are compared at one sample.
 ///
 /// Dry friction holds a resting joint with any torque up to its own, and the force of the hand bears it. What is left to
 /// compare is the component that no torque in the resting joint changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ObservableForce {
-    /// Both components.
-    Both,
-    /// The one along a unit vector.
-    Along(Plane<f64>),
-    /// None.
-    Neither,
+pub enum Observable {
+    /// All.
+    All,
+    /// Of the force on the arm the component along a unit vector, which takes the place of the first.
+    ForceAlong(Plane<f64>),
+    /// All but the force.
+    NoForce,
+    /// All joint torques but those of the joints whose bits are set.
+    TorquesWithout(u32),
+}
+
+impl Observable {
+    /// Whether one of so many channels is compared.
+    pub fn shows(self, channel: usize, channels: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::ForceAlong(_) => channel + 1 != channels,
+            Self::NoForce => channel + 2 < channels,
+            Self::TorquesWithout(joints) => joints & (1 << channel) == 0,
+        }
+    }
 }
 
 /// The samples of a trial that are compared: those without a gap near them, thinned to the common band.
@@ -36,20 +50,20 @@ pub struct ValidSegments {
     samples: Vec<usize>,
     /// Samples of the trial from one that may be compared to the next.
     step: usize,
-    /// Observable force at every sample of the trial; both components where nothing is listed.
-    observable: Arc<Vec<ObservableForce>>,
+    /// Channels at every sample of the trial; all where nothing is listed.
+    observable: Arc<Vec<Observable>>,
 }
 
 impl ValidSegments {
     /// Of one trial.
     ///
     /// * `left_out` - samples that are not compared
-    /// * `observable` - observable force at every sample; nothing listed: both components
+    /// * `observable` - channels at every sample; nothing listed: all
     pub fn of<const N: usize>(
         trial: &Trial<N>,
         course: &Course<N>,
         left_out: &[bool],
-        observable: Arc<Vec<ObservableForce>>,
+        observable: Arc<Vec<Observable>>,
     ) -> Self {
         let step = ((course.rate / (SAMPLES_PER_PERIOD * course.band)) as usize).max(1);
         let sound = away_from_gaps(&trial.valid, margin(course.rate, course.band));
@@ -134,21 +148,12 @@ impl ValidSegments {
 
     /// Number of samples at which each channel is observable.
     pub fn rows_per_channel(&self, channels: usize) -> Vec<usize> {
-        let count = |least: usize| {
-            let components = self.samples().map(|i| match self.at(i) {
-                ObservableForce::Both => 2,
-                ObservableForce::Along(_) => 1,
-                ObservableForce::Neither => 0,
-            });
-            components.filter(|&n| n >= least).count()
+        let rows = |c: usize| {
+            self.samples()
+                .filter(|&i| self.at(i).shows(c, channels))
+                .count()
         };
-        let mut all = vec![self.len(); channels];
-        if !self.observable.is_empty()
-            && let [.., first, second] = all.as_mut_slice()
-        {
-            (*first, *second) = (count(1), count(2));
-        }
-        all
+        (0..channels).map(rows).collect()
     }
 
     /// Parts of the same number of samples, in order; the last may be shorter.
@@ -160,20 +165,23 @@ impl ValidSegments {
 
     /// The values of channels at the samples: `[channel][sample]`.
     ///
-    /// Where one component of the force is observable, it replaces the first, and zero the second.
+    /// Where one component of the force is observable, it replaces the first. What is not observable is zero.
     pub fn pick(&self, channels: &Channels) -> Channels {
         let one = |channel: &Vec<f64>| self.samples().map(|i| channel[i]).collect();
         let mut picked: Channels = channels.iter().map(one).collect();
-        if !self.observable.is_empty()
-            && let [.., first, second] = picked.as_mut_slice()
-        {
-            for (at, &i) in self.samples.iter().enumerate() {
-                let (y, z) = (&mut first[at], &mut second[at]);
-                (*y, *z) = match self.at(i) {
-                    ObservableForce::Both => (*y, *z),
-                    ObservableForce::Along(unit) => (unit[0] * *y + unit[1] * *z, 0.0),
-                    ObservableForce::Neither => (0.0, 0.0),
-                };
+        if self.observable.is_empty() {
+            return picked;
+        }
+        for (at, &i) in self.samples.iter().enumerate() {
+            let observable = self.at(i);
+            if let (Observable::ForceAlong(unit), [.., y, z]) = (observable, picked.as_mut_slice())
+            {
+                y[at] = unit[0] * y[at] + unit[1] * z[at];
+            }
+            for (c, channel) in picked.iter_mut().enumerate() {
+                if !observable.shows(c, channels.len()) {
+                    channel[at] = 0.0;
+                }
             }
         }
         picked
@@ -184,8 +192,8 @@ impl ValidSegments {
         self.samples.iter().copied()
     }
 
-    /// Observable force at the samples; nothing is listed where that is both components at all of them.
-    pub fn force(&self) -> Vec<ObservableForce> {
+    /// Channels at the samples; nothing is listed where that is all of them everywhere.
+    pub fn observable(&self) -> Vec<Observable> {
         match self.observable.is_empty() {
             true => Vec::new(),
             false => self.samples().map(|i| self.at(i)).collect(),
@@ -199,11 +207,11 @@ impl ValidSegments {
         first.into_iter().chain(steps).collect()
     }
 
-    fn at(&self, sample: usize) -> ObservableForce {
+    fn at(&self, sample: usize) -> Observable {
         self.observable
             .get(sample)
             .copied()
-            .unwrap_or(ObservableForce::Both)
+            .unwrap_or(Observable::All)
     }
 }
 
@@ -310,9 +318,9 @@ mod tests {
 
     #[test]
     fn where_a_joint_rests_one_component_of_the_force_is_compared_or_none() {
-        let mut observable = vec![ObservableForce::Both; 8];
-        observable[1] = ObservableForce::Along([0.6, 0.8]);
-        observable[2] = ObservableForce::Neither;
+        let mut observable = vec![Observable::All; 8];
+        observable[1] = Observable::ForceAlong([0.6, 0.8]);
+        observable[2] = Observable::NoForce;
         let segments = ValidSegments {
             samples: (0..8).collect(),
             step: 1,
@@ -325,5 +333,24 @@ mod tests {
         assert_eq!(picked[1][..3], [10.0, 22.0, 0.0]);
         assert_eq!(picked[2][..3], [20.0, 0.0, 0.0]);
         assert_eq!(of(vec![(0..8).collect()]).rows_per_channel(3), [8; 3]);
+    }
+
+    #[test]
+    fn the_torque_of_a_joint_that_rests_is_not_compared() {
+        let mut observable = vec![Observable::All; 8];
+        observable[1] = Observable::TorquesWithout(0b100);
+        observable[2] = Observable::TorquesWithout(0b011);
+        let segments = ValidSegments {
+            samples: (0..8).collect(),
+            step: 1,
+            observable: Arc::new(observable),
+        };
+        assert_eq!(segments.rows_per_channel(3), [7, 7, 7]);
+        let picked = segments.pick(&vec![vec![1.0; 8]; 3]);
+        let at = |i: usize| [0, 1, 2].map(|c| picked[c][i]);
+        assert_eq!(
+            [at(0), at(1), at(2)],
+            [[1.0; 3], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        );
     }
 }

@@ -1,8 +1,8 @@
 //! Whitened rows: the prediction error of each sample from those before it, in units of the noise.
 //!
-//! Where dry friction holds a joint, one component of the force or none is observable. A component that was not observed predicts
-//! nothing: the next sample is predicted from those observed before, at their lags, or a level of slow noise would count as new
-//! after every rest.
+//! Where dry friction holds a joint, one component of the force or none is observable, or not the torque of the joint. What was not
+//! observed predicts nothing: the next sample is predicted from those observed before, at their lags, or a level of slow noise would
+//! count as new after every rest.
 
 use std::collections::BTreeMap;
 
@@ -10,21 +10,21 @@ use arm_core::Plane;
 use arm_numerics::statistics::autoregressive::{Predictor, Whitener};
 
 use crate::data::course::Channels;
-use crate::data::valid_segments::ObservableForce;
+use crate::data::valid_segments::Observable;
 
-/// Which samples there are, and the observable force at each.
+/// Which samples there are, and the channels that are observable at each.
 #[derive(Clone, Copy)]
 pub struct Observed<'a> {
     /// How far each sample is from the one before it, in samples; the first is not read.
     pub spacing: &'a [usize],
-    /// Observable force, the last two channels; both components at all samples where nothing is listed.
-    pub force: &'a [ObservableForce],
+    /// Channels that are observable; all at all samples where nothing is listed.
+    pub channels: &'a [Observable],
 }
 
 impl Observed<'_> {
-    /// Observable force at a sample.
-    pub fn force_at(&self, t: usize) -> ObservableForce {
-        *self.force.get(t).unwrap_or(&ObservableForce::Both)
+    /// Channels at a sample.
+    pub fn at(&self, t: usize) -> Observable {
+        *self.channels.get(t).unwrap_or(&Observable::All)
     }
 }
 
@@ -64,14 +64,12 @@ impl Whitening {
                 observed,
                 predictors: BTreeMap::new(),
             };
-            let force = (c + 2).checked_sub(whiteners.len());
-            let row = |t: usize| match force.filter(|_| !observed.force.is_empty()) {
-                None => known.row((c, t), None),
-                Some(component) => match (observed.force_at(t), component) {
-                    (ObservableForce::Both, _) => known.row((c, t), None),
-                    (ObservableForce::Along(unit), 0) => known.row((c, t), Some(unit)),
-                    _ => Row::Unobserved,
-                },
+            let row = |t: usize| match observed.at(t) {
+                at if !at.shows(c, whiteners.len()) => Row::Unobserved,
+                Observable::ForceAlong(unit) if c + 2 == whiteners.len() => {
+                    known.row((c, t), Some(unit))
+                }
+                _ => known.row((c, t), None),
             };
             (0..place.len()).map(row).collect()
         });
@@ -128,11 +126,10 @@ impl Known<'_> {
     fn row(&mut self, (c, t): (usize, usize), along: Option<Plane<f64>>) -> Row {
         let model = along.map_or(c, |unit| self.louder((c, c + 1), unit));
         let order = self.whiteners[model].order();
-        let is_observed = |i: &usize| match self.observed.force_at(*i) {
-            _ if !self.is_force(c) => true,
-            ObservableForce::Both => true,
-            ObservableForce::Along(_) => along.is_some(),
-            ObservableForce::Neither => false,
+        let is_observed = |i: &usize| match self.observed.at(*i) {
+            // A component is no sample of the first channel, but one of that component.
+            Observable::ForceAlong(_) if c + 2 == self.whiteners.len() => along.is_some(),
+            at => at.shows(c, self.whiteners.len()),
         };
         let past: Vec<usize> = (0..t).rev().filter(is_observed).take(order).collect();
         let lags: Vec<usize> = past
@@ -155,19 +152,14 @@ impl Known<'_> {
             let each = std::iter::zip(past, factors);
             return Row::From(each.map(|(i, a)| (c, i, a)).collect(), inverse);
         };
-        let each =
-            std::iter::zip(past, factors).flat_map(|(i, a)| match self.observed.force_at(i) {
-                ObservableForce::Both => vec![(c, i, a * unit[0]), (c + 1, i, a * unit[1])],
-                _ => vec![(c, i, a)],
-            });
+        let each = std::iter::zip(past, factors).flat_map(|(i, a)| match self.observed.at(i) {
+            Observable::All => vec![(c, i, a * unit[0]), (c + 1, i, a * unit[1])],
+            _ => vec![(c, i, a)],
+        });
         Row::From(
             each.collect(),
             inverse * self.size(model) / self.size_along((c, c + 1), unit),
         )
-    }
-
-    fn is_force(&self, c: usize) -> bool {
-        !self.observed.force.is_empty() && c + 2 >= self.whiteners.len()
     }
 
     /// Standard deviation of the innovations of a channel.
@@ -208,17 +200,17 @@ mod tests {
     }
 
     /// The information that a constant of the first component has in the rows, by the square of its whitened column.
-    fn information(force: &[ObservableForce], column: [f64; 2]) -> f64 {
+    fn information(force: &[Observable], column: [f64; 2]) -> f64 {
         let spacing: Vec<usize> = (0..force.len()).map(|t| usize::from(t > 0)).collect();
         let observed = Observed {
             spacing: &spacing,
-            force,
+            channels: force,
         };
         let whitening = Whitening::new(&[slow(1.0), slow(1.0)], observed);
         let values = |c: usize| {
-            let observable = |f: &ObservableForce| match (f, c) {
-                (ObservableForce::Both, _) => column[c],
-                (ObservableForce::Along(u), 0) => u[0] * column[0] + u[1] * column[1],
+            let observable = |f: &Observable| match (f, c) {
+                (Observable::ForceAlong(u), 0) => u[0] * column[0] + u[1] * column[1],
+                _ if f.shows(c, 2) => column[c],
                 _ => 0.0,
             };
             force.iter().map(observable).collect::<Vec<f64>>()
@@ -232,10 +224,10 @@ mod tests {
     /// rests in which nothing is observed.
     #[test]
     fn a_rest_tells_no_more_of_a_level_than_motion() {
-        use ObservableForce::{Along, Both, Neither};
+        use Observable::{All as Both, ForceAlong as Along, NoForce as Neither};
         const N: usize = 120;
         let resting = |t: usize| t % 12 >= 9;
-        let with = |rest: ObservableForce| -> Vec<ObservableForce> {
+        let with = |rest: Observable| -> Vec<Observable> {
             (0..N)
                 .map(|t| if resting(t) { rest } else { Both })
                 .collect()
@@ -257,13 +249,37 @@ mod tests {
         assert!(y < 1.1 * whole && z < 1.2 * whole, "{y} {z} {whole}");
     }
 
+    /// The torque of a joint that rests is no sample of it, and the other torques are compared.
+    #[test]
+    fn a_torque_that_is_not_observed_leaves_no_row() {
+        let rest: Vec<Observable> = (0..60)
+            .map(|t| match t % 12 {
+                9.. => Observable::TorquesWithout(0b01),
+                _ => Observable::All,
+            })
+            .collect();
+        let all = [Observable::All; 60];
+        let [first, second] = [[1.0, 0.0], [0.0, 1.0]];
+        assert!(information(&rest, first) < information(&all, first));
+        assert_eq!(information(&rest, second), information(&all, second));
+        let spacing = [1; 60];
+        let observed = Observed {
+            spacing: &spacing,
+            channels: &rest,
+        };
+        let whitening = Whitening::new(&[slow(1.0), slow(1.0)], observed);
+        let unobserved = (0..60).filter(|&t| !whitening.is_observable((0, t)));
+        assert_eq!(unobserved.count(), 15);
+        assert!((0..60).all(|t| whitening.is_observable((1, t))));
+    }
+
     #[test]
     fn a_component_has_the_noise_of_both_channels_as_it_has_them() {
         let unit = [0.6, 0.8];
-        let force = [ObservableForce::Along(unit)];
+        let force = [Observable::ForceAlong(unit)];
         let observed = Observed {
             spacing: &[0],
-            force: &force,
+            channels: &force,
         };
         let mut channels = vec![vec![1.0], vec![0.0]];
         Whitening::new(&[slow(2.0), slow(1.0)], observed).apply(&mut channels);

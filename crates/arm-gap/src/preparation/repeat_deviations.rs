@@ -33,7 +33,7 @@ impl Repeats {
             let mean = self.trials.iter().map(|t| t[c][i]).sum::<f64>() / n;
             scale * (value - mean)
         };
-        let (spacing, force) = (self.samples.spacing(), self.samples.force());
+        let (spacing, observable) = (self.samples.spacing(), self.samples.observable());
         let one = |trial: &Channels| {
             let channels = trial.iter().enumerate();
             let off = channels
@@ -41,7 +41,7 @@ impl Repeats {
             Thinned {
                 channels: off.collect(),
                 spacing: spacing.clone(),
-                force: force.clone(),
+                observable: observable.clone(),
             }
         };
         self.trials.iter().map(one).collect()

@@ -7,7 +7,7 @@ use arm_core::{Pose, jacobian};
 
 use crate::data::course::Course;
 use crate::data::session::ComparisonMode;
-use crate::data::valid_segments::{ObservableForce, ValidSegments, widened};
+use crate::data::valid_segments::{Observable, ValidSegments, widened};
 use crate::hypothesis::Hypothesis;
 use crate::prepared_session::{PreparedSession, Rest};
 use crate::sensitivity::linearization_point::LinearizationPoint;
@@ -118,19 +118,19 @@ impl<const N: usize> PreparedSession<'_, N> {
         match point.lines.get(group) {
             Some(line) if N <= 2 && self.session.comparison == ComparisonMode::Led => {
                 let observable = |i: usize| match held(i)[..] {
-                    [] => ObservableForce::Both,
+                    [] => Observable::All,
                     // The torque of the other joint, as a component of the force.
                     [j] if N == 2 => {
                         let moves = jacobian(&self.session.chain, &Pose::new(&line.state(i).0));
                         let column = moves.column(1 - j);
                         match column.norm() {
                             size if size > 0.0 => {
-                                ObservableForce::Along([column[0] / size, column[1] / size])
+                                Observable::ForceAlong([column[0] / size, column[1] / size])
                             }
-                            _ => ObservableForce::Neither,
+                            _ => Observable::NoForce,
                         }
                     }
-                    _ => ObservableForce::Neither,
+                    _ => Observable::NoForce,
                 };
                 Rest {
                     observable: Arc::new((0..count).map(observable).collect()),
@@ -158,10 +158,23 @@ impl<const N: usize> PreparedSession<'_, N> {
                 std::iter::zip(joint.iter_mut(), own).for_each(|(rests, own)| *rests |= own);
             }
         }
-        let rests = |i: usize| joints.iter().all(|joint| joint[i]);
+        let at = |i: usize| {
+            (0..N)
+                .filter(|&j| joints[j][i])
+                .fold(0_u32, |set, j| set | 1 << j)
+        };
+        let resting: Vec<u32> = (0..joints[0].len()).map(at).collect();
         Rest {
-            left_out: (0..joints[0].len()).map(rests).collect(),
-            observable: Arc::default(),
+            left_out: resting
+                .iter()
+                .map(|set| set.count_ones() == N as u32)
+                .collect(),
+            observable: Arc::new(
+                resting
+                    .into_iter()
+                    .map(Observable::TorquesWithout)
+                    .collect(),
+            ),
             joints,
         }
     }
