@@ -55,12 +55,6 @@ impl<const N: usize> PreparedSession<'_, N> {
         self.leaves_out_rest() && dry_joints(hypothesis) == [false; N]
     }
 
-    /// Whether some joint with dry friction rests at a sample of a movement that was measured.
-    pub(crate) fn is_at_rest(&self, group: usize, sample: usize) -> bool {
-        let joints = self.resting.get(group).map_or(&[][..], |r| &r.joints);
-        joints.iter().any(|rests| rests.get(sample) == Some(&true))
-    }
-
     /// Compares rest as motion, until other joints are dry.
     pub(crate) fn compare_rest(&mut self) {
         self.resting.clear();
@@ -311,7 +305,6 @@ mod tests {
             samples.any(|i| i.abs_diff(at) < 10)
         };
         assert!(compared(&prepared, stroke) && compared(&prepared, pause));
-        assert!(prepared.is_at_rest(0, pause) && !prepared.is_at_rest(0, stroke));
         // Where both rest, nothing is compared.
         let first = Effect::new(Kind::Coulomb, 0).with(&[0.2, 0.01]);
         let mut both = session.given();

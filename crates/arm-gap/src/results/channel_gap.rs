@@ -189,7 +189,7 @@ mod tests {
             group: 0,
             test: number > 1,
             rate: 50.0,
-            counted: vec![true; 100],
+            counted: vec![vec![true; 100]],
             measured: vec![vec![0.0; 100]],
             shown: shown.map(|v| v.map(|v| vec![vec![v; 100]])),
             free: [const { None }; 3],

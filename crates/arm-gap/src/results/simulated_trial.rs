@@ -47,8 +47,9 @@ pub struct SimulatedTrial {
     pub test: bool,
     /// Sampling rate \[Hz\].
     pub rate: f64,
-    /// Samples over which a gap and the scatter of repeats are measured: not those that a disturbance affects.
-    pub counted: Vec<bool>,
+    /// Samples over which gap and scatter of repeats of each channel are measured, `[channel][sample]`: not those that a disturbance affects,
+    /// nor a joint's torque while friction holds it in a measured motion.
+    pub counted: Vec<Vec<bool>>,
     /// Measured channels.
     pub measured: Channels,
     /// Channels by version; `None` where the trial cannot be simulated.
@@ -73,7 +74,7 @@ impl SimulatedTrial {
             group: trial.configuration,
             test: trial.role == Role::Test,
             rate: course.rate,
-            counted: course.counted.clone(),
+            counted: vec![course.counted.clone(); session.channels()],
             measured: session.measured_in(course),
             shown: [const { None }; 3],
             free: [const { None }; 3],
@@ -94,12 +95,12 @@ impl SimulatedTrial {
             let course = prepared.courses[i].as_ref();
             let mut trial = Self::measured(session, (i, &input.trials[i].file), course);
             trial.group = prepared.group_of[i];
-            for (k, counted) in trial.counted.iter_mut().enumerate() {
-                *counted &= !prepared.is_left_out(i, k as f64 / course.rate);
+            let left_out = |k: usize| prepared.is_left_out(i, k as f64 / course.rate);
+            let left_out: Vec<bool> = (0..course.counted.len()).map(left_out).collect();
+            for counted in &mut trial.counted {
+                std::iter::zip(counted, &left_out).for_each(|(counted, out)| *counted &= !out);
             }
-            if session.compares_contact_torques() {
-                trial.leave_out_rest(prepared);
-            }
+            trial.leave_out_rest(&course.at_rest);
             let own = plays
                 .iter()
                 .map(|(version, beliefs)| (*version, &beliefs[i]));
@@ -112,16 +113,18 @@ impl SimulatedTrial {
         prepared.parallel(prepared.courses.len(), one)
     }
 
-    /// Leaves out what joints with dry friction hold at rest, where enough is left: along a measured motion nothing says what that is.
-    fn leave_out_rest<const N: usize>(&mut self, prepared: &PreparedSession<'_, N>) {
+    /// Leaves out the torque of each joint while friction holds it, where enough is left: along a measured motion nothing says what that is.
+    ///
+    /// * `at_rest` - by joint; nothing where the motion is simulated
+    fn leave_out_rest(&mut self, at_rest: &[Vec<bool>]) {
         /// Shortest time that is enough \[s\].
         const ENOUGH: f64 = 1.0;
-        let each = self.counted.iter().enumerate();
-        let moving: Vec<bool> = each
-            .map(|(k, counted)| *counted && !prepared.is_at_rest(self.group, k))
-            .collect();
-        if moving.iter().filter(|m| **m).count() as f64 >= ENOUGH * self.rate {
-            self.counted = moving;
+        for (counted, rests) in std::iter::zip(&mut self.counted, at_rest) {
+            let each = std::iter::zip(&*counted, rests);
+            let moving: Vec<bool> = each.map(|(counted, rests)| *counted && !rests).collect();
+            if moving.iter().filter(|m| **m).count() as f64 >= ENOUGH * self.rate {
+                *counted = moving;
+            }
         }
     }
 
@@ -133,7 +136,10 @@ impl SimulatedTrial {
     /// Simulated less measured of one channel, at the samples that count.
     fn differences(&self, version: Version, channel: usize) -> Option<Vec<f64>> {
         let shown = &self.version(version)?[channel];
-        let all = shown.iter().zip(&self.measured[channel]).zip(&self.counted);
+        let all = shown
+            .iter()
+            .zip(&self.measured[channel])
+            .zip(&self.counted[channel]);
         Some(
             all.filter(|(_, counted)| **counted)
                 .map(|((shown, measured), _)| shown - measured)

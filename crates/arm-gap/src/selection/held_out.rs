@@ -11,8 +11,8 @@ pub struct TrialResidual {
     pub rate: f64,
     /// Measured less simulated channels; `None` where the trial cannot be simulated.
     pub residuals: Option<Vec<Vec<f64>>>,
-    /// Samples that count.
-    pub counted: Vec<bool>,
+    /// Samples that count, `[channel][sample]`.
+    pub counted: Vec<Vec<bool>>,
 }
 
 /// The gap of one channel on the test trials.
@@ -81,7 +81,7 @@ fn channel(trials: &[TrialResidual], c: usize) -> HeldOutGap {
         .iter()
         .filter_map(|&t| {
             let residuals = trials[t].residuals.as_ref()?;
-            let counted: Vec<(usize, f64)> = counted(&trials[t], &residuals[c]);
+            let counted: Vec<(usize, f64)> = counted(&trials[t].counted[c], &residuals[c]);
             Some((t, pieces(&counted, trials[t].rate)))
         })
         .collect();
@@ -99,7 +99,7 @@ fn channel(trials: &[TrialResidual], c: usize) -> HeldOutGap {
     };
     let missing = tests.iter().find(|&&t| trials[t].residuals.is_none());
     let open_everywhere = |&trial: &usize| {
-        let end = trials[trial].counted.len() as f64 / trials[trial].rate;
+        let end = trials[trial].counted[c].len() as f64 / trials[trial].rate;
         OpenSpan {
             trial,
             span: (0.0, end),
@@ -153,13 +153,17 @@ fn floor(trials: &[TrialResidual], c: usize, test: bool) -> Option<(f64, Freedom
             continue;
         }
         let n = members.len() as f64;
-        let length = members.iter().map(|t| t.counted.len()).max().unwrap_or(0);
+        let length = members
+            .iter()
+            .map(|t| t.counted[c].len())
+            .max()
+            .unwrap_or(0);
         let of = |t: &TrialResidual, i: usize| t.residuals.as_ref().map_or(0.0, |r| r[c][i]);
         // At every sample those that last so long.
         let present = |i: usize| {
             let lasting = members
                 .iter()
-                .filter(move |t| t.counted.get(i) == Some(&true));
+                .filter(move |t| t.counted[c].get(i) == Some(&true));
             lasting.map(|t| of(t, i)).collect::<Vec<f64>>()
         };
         let means: Vec<Option<(f64, f64)>> = (0..length)
@@ -173,8 +177,8 @@ fn floor(trials: &[TrialResidual], c: usize, test: bool) -> Option<(f64, Freedom
         let used: Vec<&&TrialResidual> = members.iter().filter(|t| t.test == test).collect();
         let mut made = 0;
         for member in &used {
-            let deviation: Vec<(usize, f64)> = (0..member.counted.len())
-                .filter(|&i| member.counted[i])
+            let deviation: Vec<(usize, f64)> = (0..member.counted[c].len())
+                .filter(|&i| member.counted[c][i])
                 .filter_map(|i| means[i].map(|(mean, scale)| (i, scale * (of(member, i) - mean))))
                 .collect();
             let own = pieces(&deviation, member.rate);
@@ -204,8 +208,8 @@ fn floor(trials: &[TrialResidual], c: usize, test: bool) -> Option<(f64, Freedom
     (square > 0.0).then(|| (libm::sqrt(square), freedom))
 }
 
-fn counted(trial: &TrialResidual, residual: &[f64]) -> Vec<(usize, f64)> {
-    let all = std::iter::zip(residual, &trial.counted).enumerate();
+fn counted(counts: &[bool], residual: &[f64]) -> Vec<(usize, f64)> {
+    let all = std::iter::zip(residual, counts).enumerate();
     all.filter(|(_, (_, counted))| **counted)
         .map(|(i, (v, _))| (i, *v))
         .collect()
@@ -296,7 +300,7 @@ mod tests {
                     test: t % 3 == 2,
                     rate: 50.0,
                     residuals: Some(vec![residual]),
-                    counted: vec![true; 600],
+                    counted: vec![vec![true; 600]],
                 }
             })
             .collect()
@@ -330,7 +334,7 @@ mod tests {
                 for trial in &mut trials {
                     let own = trial.residuals.as_mut().expect("residuals");
                     own[0] = own[0][150..300].to_vec();
-                    trial.counted.truncate(150);
+                    trial.counted[0].truncate(150);
                 }
                 trials
             };

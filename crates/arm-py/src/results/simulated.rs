@@ -5,7 +5,7 @@ use std::sync::Arc;
 use arm_gap::data::course::Channels;
 use arm_gap::results as core;
 use arm_gap::results::Version;
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{Element, PyArray2, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
 
@@ -24,8 +24,8 @@ use crate::errors::bad_input;
 ///     Whether it is a test trial.
 /// rate : float
 ///     Sampling rate [Hz].
-/// counted : ndarray of bool, shape (n,)
-///     Samples over which a gap is measured.
+/// counted : ndarray of bool, shape (n, n_channels)
+///     Samples over which the gap of each channel is measured.
 /// measured : ndarray, shape (n, n_channels)
 ///     Measured channels, in their units.
 /// shown : mapping of str to ndarray or None, shape (n, n_channels)
@@ -39,13 +39,13 @@ pub struct SimulatedTrial(pub Arc<core::SimulatedTrial>);
 nested!(Arc<core::SimulatedTrial> => SimulatedTrial);
 
 /// Channels as an array, `(n_samples, n_channels)`.
-fn array<'py>(py: Python<'py>, channels: &Channels) -> Bound<'py, PyArray2<f64>> {
+fn array<'py, T: Element + Copy>(py: Python<'py>, channels: &[Vec<T>]) -> Bound<'py, PyArray2<T>> {
     let (rows, columns) = (channels.first().map_or(0, Vec::len), channels.len());
     let at = |(row, column): (usize, usize)| channels[column][row];
     numpy::ndarray::Array2::from_shape_fn((rows, columns), at).to_pyarray(py)
 }
 
-fn channels(array: &PyReadonlyArray2<'_, f64>) -> Channels {
+fn channels<T: Element + Copy>(array: &PyReadonlyArray2<'_, T>) -> Vec<Vec<T>> {
     let columns = array.as_array();
     columns.columns().into_iter().map(|c| c.to_vec()).collect()
 }
@@ -82,7 +82,7 @@ impl SimulatedTrial {
         group: usize,
         test: bool,
         rate: f64,
-        counted: PyReadonlyArray1<'_, bool>,
+        counted: PyReadonlyArray2<'_, bool>,
         measured: PyReadonlyArray2<'_, f64>,
         shown: &Bound<'_, PyAny>,
         free: &Bound<'_, PyAny>,
@@ -92,7 +92,7 @@ impl SimulatedTrial {
             group,
             test,
             rate,
-            counted: counted.as_array().to_vec(),
+            counted: channels(&counted),
             measured: channels(&measured),
             shown: versions("shown", shown)?,
             free: versions("free", free)?,
@@ -118,10 +118,10 @@ impl SimulatedTrial {
     fn rate(&self) -> f64 {
         self.0.rate
     }
-    /// Samples over which a gap is measured, shape (n,).
+    /// Samples over which the gap of each channel is measured, shape (n, n_channels).
     #[getter]
-    fn counted<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        self.0.counted.to_pyarray(py)
+    fn counted<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<bool>> {
+        array(py, &self.0.counted)
     }
     /// Measured channels, in their units, shape (n, n_channels).
     #[getter]
@@ -145,7 +145,7 @@ impl SimulatedTrial {
         format!(
             "SimulatedTrial('{}': {} samples at {} Hz, {} channels; simulated: {})",
             of.file,
-            of.counted.len(),
+            of.measured.first().map_or(0, Vec::len),
             of.rate,
             of.measured.len(),
             simulated.join(", ")

@@ -111,18 +111,18 @@ def _law(result: GapFound, effect: Missing, own: Effect, shown: EffectCurve) -> 
     found = [
         d
         for d in residual_maps.discrepancies(result.dataset, is_led(result.dataset), result.trials, "amended")
-        if d.trial.role == "fit" and d.valid().sum() > _FEWEST
+        if d.trial.role == "fit" and d.valid(joint).sum() > _FEWEST
     ]
     if not found:
         return shown
     built = _armrs.Rig(result.model, [own, *_ends(effect, own)])
-    torques = [built.resisting(d.q, d.qd, np.gradient(d.qd, 1.0 / d.trial.rate, axis=0), 1.0 / d.trial.rate)[d.valid()] for d in found]
+    torques = [built.resisting(d.q, d.qd, np.gradient(d.qd, 1.0 / d.trial.rate, axis=0), 1.0 / d.trial.rate)[d.valid(joint)] for d in found]
     axes = {
-        "speed": [d.qd[d.valid(), joint] for d in found],
-        "angle": [d.q[d.valid(), joint] for d in found],
-        "time": [(d.trial.t - d.trial.t[0])[d.valid()] for d in found],
+        "speed": [d.qd[d.valid(joint), joint] for d in found],
+        "angle": [d.q[d.valid(joint), joint] for d in found],
+        "time": [(d.trial.t - d.trial.t[0])[d.valid(joint)] for d in found],
     }
-    measured = [torque[:, 0] + d.torque[d.valid(), joint] for torque, d in zip(torques, found, strict=True)]
+    measured = [torque[:, 0] + d.torque[d.valid(joint), joint] for torque, d in zip(torques, found, strict=True)]
     against = max(axes, key=lambda name: _described(axes[name], [t[:, 0] for t in torques]))
     x, cells = _cells(axes[against])
     count = len(x)

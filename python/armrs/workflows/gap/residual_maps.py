@@ -33,8 +33,8 @@ class Discrepancy:
         Positive where the joint resists a growing angle more than the model does [N m].
     q, qd : ndarray, shape (n, n_joints)
         Angles and speeds of the joints [rad, rad/s]: simulated for a led arm, else measured.
-    counted : ndarray of bool, shape (n,)
-        Samples over which a gap is measured; not those that a disturbance has touched.
+    counted : ndarray of bool, shape (n, n_joints)
+        Samples over which the gap of each joint is measured; not those that a disturbance has touched.
     """
 
     trial: Trial
@@ -43,9 +43,9 @@ class Discrepancy:
     qd: np.ndarray
     counted: np.ndarray
 
-    def valid(self) -> np.ndarray:
-        """Return which samples were measured and count, shape (n,)."""
-        return np.asarray(self.trial.valid, dtype=bool) & self.counted
+    def valid(self, joint: int) -> np.ndarray:
+        """Return which samples of a joint (zero-based) were measured and count, shape (n,)."""
+        return np.asarray(self.trial.valid, dtype=bool) & self.counted[:, joint]
 
 
 def discrepancies(dataset: Dataset, led: bool, plays: Sequence[SimulatedTrial], version: str) -> list[Discrepancy]:
@@ -77,9 +77,8 @@ def discrepancies(dataset: Dataset, led: bool, plays: Sequence[SimulatedTrial], 
             continue
         if led:
             q = simulated[:, :n]
-            listed.append(
-                Discrepancy(trial, carried(measured) - carried(simulated), q, np.gradient(q, 1.0 / trial.rate, axis=0), play.counted)
-            )
+            counted = np.repeat(play.counted.all(axis=1, keepdims=True), n, axis=1)
+            listed.append(Discrepancy(trial, carried(measured) - carried(simulated), q, np.gradient(q, 1.0 / trial.rate, axis=0), counted))
         else:
             speed = np.gradient(trial.q, 1.0 / trial.rate, axis=0) if trial.dq is None else trial.dq
             listed.append(Discrepancy(trial, measured - simulated, np.asarray(trial.q), np.asarray(speed), play.counted))
@@ -96,7 +95,7 @@ def places(found: Sequence[Discrepancy], most: int = 40) -> tuple[Place, ...]:
             torque, speed = one.torque[:, j], one.qd[:, j]
             limit = _MOVING * np.max(np.abs(speed), initial=0.0)
             for condition, region in (("> 0", speed > limit), ("< 0", speed < -limit), ("= 0", np.abs(speed) <= limit)):
-                chosen = np.flatnonzero(region & one.valid())
+                chosen = np.flatnonzero(region & one.valid(j))
                 if len(chosen) < _FEWEST:
                     continue
                 mean = float(np.mean(torque[chosen]))
@@ -141,13 +140,13 @@ class Map:
 def residual_map(found: Sequence[Discrepancy], joint: int, cells: tuple[int, int] = (14, 9), role: str = "fit") -> Map:
     """Return the map of one joint (zero-based) over the trials of a role, with so many cells of angle and of speed."""
     own = [d for d in found if d.trial.role == role]
-    q, qd = (np.concatenate([getattr(d, name)[d.valid(), joint] for d in own]) for name in ("q", "qd"))
+    q, qd = (np.concatenate([getattr(d, name)[d.valid(joint), joint] for d in own]) for name in ("q", "qd"))
     angle = np.linspace(q.min(), q.max() if np.ptp(q) > 0 else q.min() + 1e-9, cells[0] + 1)
     fast = float(np.quantile(np.abs(qd), 0.995)) or 1e-9
     speed = np.linspace(-fast, fast, cells[1] + 1)
     means = []
     for d in own:
-        valid = d.valid()
+        valid = d.valid(joint)
         column = np.clip(np.searchsorted(angle, d.q[valid, joint], side="right") - 1, 0, cells[0] - 1)
         row = np.clip(np.searchsorted(speed, d.qd[valid, joint], side="right") - 1, 0, cells[1] - 1)
         count, total = np.zeros((cells[1], cells[0])), np.zeros((cells[1], cells[0]))
@@ -174,10 +173,10 @@ def shape(found: Sequence[Discrepancy]) -> str | None:
 
     Shares are of the mean square of the torque that is left in the fit trials, less its mean.
     """
-    own = [d for d in found if d.trial.role == "fit" and d.valid().sum() >= _FEWEST]
+    own = [d for d in found if d.trial.role == "fit" and all(d.valid(j).sum() >= _FEWEST for j in range(d.q.shape[1]))]
     if not own:
         return None
-    size = np.array([[float(np.mean(d.torque[d.valid(), j] ** 2)) for j in range(d.q.shape[1])] for d in own])
+    size = np.array([[float(np.mean(d.torque[d.valid(j), j] ** 2)) for j in range(d.q.shape[1])] for d in own])
     j = int(np.argmax(size.mean(axis=0)))
     where = f"joint {j + 1} ({math.sqrt(float(size[:, j].mean())):.2g} N m, root mean square)"
     if len(own) > 2 and size[:, j].max() > _ALONE * max(float(np.median(size[:, j])), 1e-300):
@@ -192,8 +191,8 @@ def shape(found: Sequence[Discrepancy]) -> str | None:
 
 def _described(own: Sequence[Discrepancy], j: int, columns: Any) -> float:
     """Return the share of what is left in joint `j` that a linear combination of columns describes."""
-    rows = [np.column_stack([np.ones(d.valid().sum()), *(c[d.valid()] for c in columns(d, j))]) for d in own]
-    matrix, left = np.concatenate(rows), np.concatenate([d.torque[d.valid(), j] for d in own])
+    rows = [np.column_stack([np.ones(d.valid(j).sum()), *(c[d.valid(j)] for c in columns(d, j))]) for d in own]
+    matrix, left = np.concatenate(rows), np.concatenate([d.torque[d.valid(j), j] for d in own])
     left = left - left.mean()
     matrix = matrix / np.maximum(np.abs(matrix).max(axis=0), 1e-300)
     solution = np.linalg.lstsq(matrix, left, rcond=None)[0]
