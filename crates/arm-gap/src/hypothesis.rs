@@ -133,6 +133,18 @@ impl<const N: usize> Hypothesis<N> {
         (parameter == rest).then_some(effect.parameters[amplitude])
     }
 
+    /// Whether a number is the angle of a joint about which a law lies, such as a rest angle.
+    pub fn is_joint_angle(&self, target: Target) -> bool {
+        let (effect, parameter) = match target {
+            Target::Known(e, p) => (&self.known[e], p),
+            Target::Named(e, p) => (&self.named[e], p),
+            _ => return false,
+        };
+        let info = &effect.kind.info().parameters[parameter];
+        // A phase is an angle of no joint.
+        info.unit == "rad" && !info.linear && !effect.kind.prior().nature.swings()
+    }
+
     /// Hands what calibration stands in for a sensor over to a named fault of the same sensor: the two are one sum, and the fault is
     /// free to be as large as it is.
     pub fn handed_over(mut self) -> Self {

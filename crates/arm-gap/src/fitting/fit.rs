@@ -338,13 +338,14 @@ pub fn regularise<const N: usize>(
     hypothesis: &Hypothesis<N>,
     coordinates: &[Coordinate],
 ) {
-    /// Least size of a rest angle \[rad\].
+    /// Least size of the angle of a joint \[rad\].
     const ANGLE: f64 = 1.0;
     for (i, c) in coordinates.iter().enumerate() {
         if c.prior.is_none() {
-            let least = hypothesis
-                .spring_that_rests(c.target)
-                .map_or(10.0 * c.step, |_| ANGLE);
+            let least = match hypothesis.is_joint_angle(c.target) {
+                true => ANGLE,
+                false => 10.0 * c.step,
+            };
             let size = hypothesis.get(c.target).abs().max(least);
             gram[(i, i)] += 1.0 / (size * size);
         }
@@ -476,6 +477,8 @@ pub(crate) fn decided<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use arm_core::effect::{Effect, Kind};
+
     use super::*;
     use crate::hypothesis::tests::plain;
 
@@ -524,6 +527,32 @@ mod tests {
         assert!(near(&plain, 3.0, 36.0) && near(&damped, 1.5, 27.0));
         let bounded = equations(4.0, 12.0, (-1.0, 1.0)).step(0.0).expect("a step");
         assert!(near(&bounded, 1.0, 20.0));
+    }
+
+    /// A rest angle near zero could move by a hundredth of a radian in a step, and a fit ended before it was reached.
+    #[test]
+    fn an_angle_of_a_joint_has_no_size_of_its_own() {
+        let mut hypothesis = plain();
+        hypothesis.named = [
+            (Kind::CubicElastic, 1),
+            (Kind::Elastic, 1),
+            (Kind::Relaxation, 0),
+        ]
+        .map(|(kind, joint)| Effect::new(kind, joint).with(&[1.0, 0.002]))
+        .into();
+        let coordinate = |slot| Coordinate {
+            target: Target::Named(slot, 1),
+            prior: None,
+            lower: -7.0,
+            upper: 7.0,
+            step: 1e-3,
+        };
+        let mut gram = Matrix::zeros(3, 3);
+        regularise(&mut gram, &hypothesis, &[0, 1, 2].map(coordinate));
+        let size = [0, 1, 2].map(|i| 1.0 / libm::sqrt(gram[(i, i)]));
+        // A time moves by ten of its steps at most.
+        assert!((size[2] - 0.01).abs() < 1e-12, "{size:?}");
+        assert_eq!(size[..2], [1.0, 1.0]);
     }
 
     /// A law that may miss as much as noise leaves widens the intervals by the square root of two, others not at all.
