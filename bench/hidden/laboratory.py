@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from mujoco_world.sizes import SIZES
 
+from armrs.io.dataset import load_dataset
 from armrs.model import Effect, Model
 from armrs.montecarlo.sweep_file import load_sweep
 from armrs.workflows.experiment import Experiment
@@ -37,6 +38,8 @@ KINDS = ("coulomb", "quadratic_drag", "cubic_elastic", "relaxation", "constant_m
 POSTURE = (-1.05, 1.05, 0.0)
 """About which the movements lead the arm [rad]."""
 KEPT = ("dataset.toml", "model.toml", "trials")
+FASTER = 1.5
+"""A reflex acts where its joint moves this many times as fast as its threshold."""
 
 
 def told(kind: str, joint: int | None, parameters: Mapping[str, float], exact: Collection[str]) -> dict[str, object]:
@@ -72,6 +75,32 @@ def hidden(kind: str, strength: str, draw: np.random.Generator) -> Effect:
     return Effect(kind, joint + 1, parameters=others[kind])
 
 
+def acts(effects: Sequence[Effect], folder: Path) -> bool:
+    """Return whether every reflex acts in some trial of a session: where no joint moves faster than its threshold, nothing is hidden."""
+    reflexes = [effect for effect in effects if effect.kind == "stretch_reflex"]
+    trials = load_dataset(folder).trials if reflexes else ()
+
+    def fastest(effect: Effect) -> float:
+        """Return the fastest mean speed over a quarter of a second in its direction [rad/s]."""
+        apart = [max(1, round(0.25 * trial.rate)) for trial in trials]
+        moved = [
+            (t.q[k:, (effect.joint or 1) - 1] - t.q[:-k, (effect.joint or 1) - 1]) * t.rate / k for t, k in zip(trials, apart, strict=True)
+        ]
+        return max(float((effect.parameters["direction"] * speed).max()) for speed in moved)
+
+    return all(fastest(effect) > FASTER * effect.parameters["threshold"] for effect in reflexes)
+
+
+def recorded(experiment: Experiment, folder: Path) -> None:
+    """Record a session and keep what a laboratory hands over."""
+    shutil.rmtree(folder, ignore_errors=True)
+    record(experiment, folder / "all")
+    (folder / "data").mkdir()
+    for name in KEPT:
+        shutil.move(folder / "all" / name, folder / "data" / name)
+    shutil.rmtree(folder / "all")
+
+
 def prepared(experiment: Experiment, effects: Sequence[Effect]) -> Experiment:
     """Return an experiment with an arm whose joints are known and frictionless, but for some effects."""
     truth = experiment.truth.replace(joints=[joint.replace(coulomb=0.0) for joint in experiment.truth.joints])
@@ -92,21 +121,20 @@ def main() -> None:
     sweep = load_sweep(Path(__file__).parents[1] / "sweep" / "little_known" / "SWEEP.toml")
     made = []
     for seed in range(options.seed, options.seed + options.count):
-        experiment = dataclasses.replace(sweep, seed=seed).drawn(1)
-        effects = truth(experiment.truth)
+        experiment, folder = dataclasses.replace(sweep, seed=seed).drawn(1), options.folder / f"l{seed}"
         if options.family in FAMILIES:
             draw = np.random.default_rng(seed)
             # Numbers that follow each other go round all kinds.
             own = [KINDS[(seed + 3 * k) % len(KINDS)] for k in range(FAMILIES[options.family])]
-            added = [hidden(kind, options.strength, draw) for kind in own]
-            experiment, effects = prepared(experiment, added), [told(e.kind, e.joint, e.parameters, [*e.parameters][:1]) for e in added]
-        folder = options.folder / f"l{seed}"
-        shutil.rmtree(folder, ignore_errors=True)
-        record(experiment, folder / "all")
-        (folder / "data").mkdir()
-        for name in KEPT:
-            shutil.move(folder / "all" / name, folder / "data" / name)
-        shutil.rmtree(folder / "all")
+            while True:
+                added = [hidden(kind, options.strength, draw) for kind in own]
+                recorded(prepared(experiment, added), folder)
+                if acts(added, folder / "data"):
+                    break
+            effects = [told(e.kind, e.joint, e.parameters, [*e.parameters][:1]) for e in added]
+        else:
+            recorded(experiment, folder)
+            effects = truth(experiment.truth)
         said = {
             "world": "laboratory",
             "seed": seed,
