@@ -197,6 +197,29 @@ def _first_second(trial: armrs.Trial) -> armrs.Trial:
     )
 
 
+def test_repeats_that_are_missing_from_a_curve_are_named_with_the_reason(slow_arm: Path) -> None:
+    """A curve of three repeats of four said so by its number alone."""
+    dataset = armrs.load_dataset(slow_arm)
+    first, *others = dataset.trials
+    assert first.force_on_arm is not None
+
+    def warned(**changes: np.ndarray) -> list[str]:
+        odd = armrs.Trial("odd.csv", "slow", 1, "fit", first.t, **{"q": first.q, "force_on_arm": first.force_on_arm, **changes})
+        lines = armrs.passive_moments(dataset.replace(trials=(odd, *others))).warnings
+        return [line for line in lines if "not among the repeats" in line]
+
+    assert warned() == []
+    held = np.column_stack([first.q[:, 0], np.full(len(first), first.q[:, 1].mean())])
+    assert "odd.csv: not among the repeats of joint 2: it moves by less than 2°" in warned(q=held)
+    back = np.arange(len(first)) >= np.argmax(np.abs(first.q[:, 1] - first.q[0, 1]))
+    (said,) = [line for line in warned(active=back, valid=~back) if "joint 2" in line]
+    assert said.startswith("odd.csv: not among the repeats of joint 2: the angle only ")
+    # A joint that moves in one repeat of three was held: that one is the odd one, by a line of its own.
+    still = [dataclasses.replace(t, robot_q=None, q=np.column_stack([t.q[:, 0], np.full(len(t), t.q[:, 1].mean())])) for t in others]
+    lines = armrs.passive_moments(dataset.replace(trials=(dataclasses.replace(first, robot_q=None), *still))).warnings
+    assert not any("not among the repeats of joint 2" in line for line in lines)
+
+
 def test_what_cannot_be_right_of_one_trial_is_said(slow_arm: Path) -> None:
     """The other repeats stay good, so that nothing but these lines would tell."""
     dataset = armrs.load_dataset(slow_arm)
@@ -210,6 +233,8 @@ def test_what_cannot_be_right_of_one_trial_is_said(slow_arm: Path) -> None:
     assert warned() == ""
     still = warned(q=np.radians(first.q))
     assert "odd.csv: no joint moves long enough" in still and "mean angle of joint 1 differs by 5" in still
+    active = np.arange(len(first)) < 0.98 * len(first)
+    assert "(muscles are active in 98 % of it)" in warned(active=active, valid=~active)
     assert "odd.csv: the force carries 0.09" in warned(force_on_arm=1e-3 * first.force_on_arm)
     assert "odd.csv: the force carries -" in warned(force_on_arm=-first.force_on_arm)
     assert "mean angle of joint 2 differs by 120" in warned(q=first.q[:, ::-1])

@@ -251,15 +251,16 @@ def passive_moments(
 def _missing_repeats(repeats: Sequence[TrialMoments], curve: PassiveCurve) -> list[str]:
     """Return the repeats that a curve has nothing of, a line each with the reason."""
     lines = []
-    for m, values in zip(repeats, curve.elastic_repeats, strict=True):
-        # Of a trial in which no joint moves, `_doubtful` says so.
-        if np.isfinite(values).any() or not m.direction.any():
+    moved = [motion_direction.moves(m.q[:, curve.joint - 1]) for m in repeats]
+    for m, values, moves in zip(repeats, curve.elastic_repeats, moved, strict=True):
+        # Of a trial in which no joint moves, `_doubtful` says so. A joint that moves in few of the repeats was held.
+        if np.isfinite(values).any() or not m.direction.any() or not (moves or 2 * sum(moved) > len(moved)):
             continue
         ways = set(m.direction[:, curve.joint - 1]) - {0}
-        if not motion_direction.moves(m.q[:, curve.joint - 1]):
+        if not moves:
             why = f"it moves by less than {np.degrees(motion_direction.LEAST_RANGE):g}°"
-        elif m.trial.active.mean() > 0.5:
-            why = f"muscles are active in {100 * m.trial.active.mean():.0f} % of it"
+        elif active := _muscles(m.trial):
+            why = active
         elif len(ways) < 2:
             way = "the angle only grows" if 1 in ways else "the angle only shrinks"
             why = f"{way} in what is measured" if ways else "what is measured is too short for the low-pass"
@@ -267,6 +268,12 @@ def _missing_repeats(repeats: Sequence[TrialMoments], curve: PassiveCurve) -> li
             why = "its two directions share no angles"
         lines.append(f"{m.trial.file}: not among the repeats of joint {curve.joint}: {why}")
     return lines
+
+
+def _muscles(trial: Trial) -> str | None:
+    """Return that muscles are active in most of a trial; None where they are not."""
+    share = float(trial.active.mean())
+    return f"muscles are active in {100 * share:.0f} % of it" if share > 0.5 else None
 
 
 def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[TrialMoments, ...], list[str]]:
@@ -491,9 +498,8 @@ def _doubtful(dataset: Dataset, repeats: Sequence[TrialMoments]) -> list[str]:
         there = np.isfinite(m.moment).all(axis=1)
         # Where no repeat has a direction, the movement is the cause and not a sensor, and a line on its joints states that.
         if moving and not m.direction.any():
-            lines.append(
-                f"{m.trial.file}: no joint moves long enough in one direction: the trial is not used (wrong unit, or a dead sensor?)"
-            )
+            why = _muscles(m.trial) or "wrong unit, or a dead sensor?"
+            lines.append(f"{m.trial.file}: no joint moves long enough in one direction: the trial is not used ({why})")
         if m.force is None or not there.any():
             continue
         weight = _armrs.Arm.from_model(dataset.model_of(m.trial.configuration)).gravity(m.q[there])
