@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -149,6 +150,7 @@ def test_a_folder_of_results_is_read_with_its_groups(slow_arm: Path, tmp_path: P
         ("subject,quantity,value\na,k,1e308\nb,k,-1e308\nc,k,1\n", r"row 2, value: found '1e308', allowed a number below 1e\+100"),
         ("subject,quantity,value\n,k,1\n", "row 2, subject"),
         ("subject,quantity,value\n", "a value a row"),
+        ("subject,quantity,value\na,k,\nb,k,NA\n", "value: found none, allowed a value a row"),
         ("subject,quantity,value,unit\na,k,1,N m\nb,k,1,kN m\n", "one unit a quantity"),
         ("subject,quantity,value\na,k,0,5\n", r"row 2: found 4 cells, allowed 3, as the first row \(a decimal comma\? Put semicolons"),
         ("subject;quantity;value\na;k;0,5\nb;k;0.75\n", "row 3, value: found '0.75', allowed a number .* with a decimal comma"),
@@ -213,6 +215,61 @@ def test_norm_bands_become_usual_ranges(tmp_path: Path, capsys: pytest.CaptureFi
     assert set(clinic_norms.usual_of(list(found), left)) == {("elastic", "stiffness", 2)}
     assert set(clinic_norms.usual_of(list(found), left, "slow")) == {("elastic", "stiffness", 2), ("passive", "half_width", 1)}
     assert not clinic_norms.usual_of(list(found), {"data": {"side": None}}, "slow")
+
+
+def test_rows_without_a_value_are_left_out_and_told(tmp_path: Path) -> None:
+    """One empty cell refused the whole table."""
+    rows = [f"s{k};stiffness;{value}" for k, value in enumerate(("0,5", "", "0,75", "NA", "0,625"))]
+    (tmp_path / "t.csv").write_text("\n".join(["subject;quantity;value", *rows]))
+    found = armrs.cohort(tmp_path / "t.csv")
+    assert [v.value for v in found.values] == [0.5, 0.75, 0.625]
+    assert found.warnings == (f"{tmp_path / 't.csv'}: row 3 and 1 more: no value: left out",)
+
+
+def test_sessions_without_dates_are_counted(tmp_path: Path) -> None:
+    """The sentence said 4 sessions, and the source of the norms 8."""
+    rows = [f"s{k},{what},{0.1 * k + n}" for k in range(4) for n in range(2) for what in ("a", "b")]
+    (tmp_path / "t.csv").write_text("\n".join(["subject,quantity,value", *rows]))
+    found = armrs.cohort(tmp_path / "t.csv")
+    assert found.to_dict()["sessions"] == 8 == found.quantities[0].sessions
+
+
+def test_single_sessions_say_nothing_about_the_scatter_within_subjects(tmp_path: Path) -> None:
+    """It was stated as 0."""
+    draw = np.random.default_rng(SEED)
+    (single,) = armrs.cohort(table(tmp_path / "1.csv", population(draw, 8, 1, 1.0, "a"))).quantities
+    assert single.within_std is None
+    shown = clinic_sentences.quantities({"quantities": [dataclasses.asdict(single)]}).rows[0][4]
+    assert str(shown).endswith(", –")
+    (paired,) = armrs.cohort(table(tmp_path / "2.csv", population(draw, 8, 2, 1.0, "a"))).quantities
+    assert paired.within_std == pytest.approx(0.1, rel=0.6)
+
+
+def test_norms_in_another_unit_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """They were missing without a word, also in `Nm/rad`."""
+    for unit, status in (("Nm/rad", 0), ("N·m/rad", 0), ("Nm/deg", 1)):
+        rows = [f"s{k},elastic stiffness of joint 2,{unit},{1.0 + 0.1 * k}" for k in range(5)]
+        (tmp_path / "t.csv").write_text("\n".join(["subject,quantity,unit,value", *rows]), encoding="utf-8")
+        out = tmp_path / unit.replace("/", "_")
+        assert main(["cohort", str(tmp_path / "t.csv"), "-o", str(out)]) == status
+        assert (out / "norms.toml").exists() == (status == 0)
+        said = "elastic stiffness of joint 2: found Nm/deg, allowed N m/rad: no norms for armrs report"
+        assert (said in capsys.readouterr().err) == (status == 1)
+
+
+def test_copies_and_two_analyses_of_one_recording_are_one_session(tmp_path: Path) -> None:
+    """`gap` beside `identify` counted as a second session, and so did a copy of a file."""
+    for k in range(4):
+        entry = {"kind": "elastic", "name": "stiffness", "joint": 2, "value": 1.0 + 0.1 * k, "std": 0.05, "unit": "N m/rad"}
+        data = {"name": f"s{k} 2026-03-0{k + 1}", "subject": f"s{k}"}
+        fitted = {"verb": "identify", "data": data, "parameters": [entry | {"decided_by": "data"}]}
+        effect = {"kind": "elastic", "joint": 2, "decided": True, "parameters": {"stiffness": entry | {"value": 3.0}}}
+        files.write_json(tmp_path / f"{k}" / "identified.json", fitted)
+        files.write_json(tmp_path / f"{k}" / "copy.json", fitted)
+        files.write_json(tmp_path / f"{k}" / "gap.json", {"verb": "gap", "data": data, "effects": [effect]})
+    found = armrs.cohort(tmp_path)
+    assert sorted(v.value for v in found.values) == pytest.approx([1.0, 1.1, 1.2, 1.3])
+    assert found.warnings == (f"{tmp_path}: 8 values that another result of the same session states: left out",)
 
 
 def test_a_row_of_nobody_in_the_groups_is_told(slow_arm: Path, tmp_path: Path) -> None:

@@ -72,6 +72,7 @@ def cohort(
     """
     from ..report import clinic_sentences
     from ..report.clinic_figures import cohort_data, write_cohort
+    from ..report.clinic_norms import in_other_units
     from ..workflows.cohort import cohort as summarise
 
     folder = writable(out, json, verb="cohort")
@@ -79,7 +80,8 @@ def cohort(
         result = summarise(source, groups=groups, progress=tell)
     plain = cohort_data(result, command_line(context))
     written = write_cohort(result, plain, folder) if folder else []
-    console.warn(list(result.warnings))
+    warnings = [*result.warnings, *in_other_units(result)]
+    console.warn(warnings)
     norms = next((path for path in written if path.name.startswith("norms")), None)
     step = (
         None
@@ -87,4 +89,4 @@ def cohort(
         else f"armrs report RESULT.json --summary --norms {quoted(norms)} -o clinic compares one session with these bands"
     )
     present(lambda: plain, json, lambda: clinic_sentences.show_cohort(plain, written), step)
-    return 1 if result.warnings else 0
+    return 1 if warnings else 0

@@ -15,7 +15,7 @@ from ..io import arm_side, tomlfile
 from .clinic_quantities import QUANTITIES, SLOW, Key
 
 if TYPE_CHECKING:
-    from ..workflows.cohort import Cohort
+    from ..workflows.cohort import Cohort, Quantity
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ def norms_of(cohort: Cohort) -> dict[str, str]:
     tables: dict[str, list[str]] = {}
     alone = len({q.group for q in cohort.quantities}) < 2
     for q in cohort.quantities:
-        named = _NAMED.fullmatch(q.name)
-        if named is None or q.unit not in ("", _SI.get((named["kind"], named["name"]))) or not q.norm[0] < q.norm[1]:
+        named, si = _as_norm(q)
+        if named is None or si is None or _plain(q.unit) not in ("", _plain(si)) or not q.norm[0] < q.norm[1]:
             continue
         group = "" if alone else f" of group {q.group}"
         source = f"armrs cohort {cohort.name}: {q.subjects} subjects{group}, {q.sessions} sessions"
@@ -85,6 +85,23 @@ def norms_of(cohort: Cohort) -> dict[str, str]:
         table |= {"side": arm_side.written_side(q.side), "low": q.norm[0], "high": q.norm[1], "source": source}
         tables.setdefault(q.group, []).append("\n".join(["[[norm]]", *tomlfile.lines(table)]))
     return {"norms.toml" if alone else f"norms-{_in_a_name(group)}.toml": "\n\n".join(own) + "\n" for group, own in tables.items()}
+
+
+def in_other_units(cohort: Cohort) -> list[str]:
+    """Return the quantities of a cohort that would have norms if their unit were that of results, a line each."""
+    units = {(q.name, q.unit): si for q in cohort.quantities if (si := _as_norm(q)[1]) and _plain(q.unit) not in ("", _plain(si))}
+    return [f"{name}: found {unit}, allowed {si}: no norms for armrs report" for (name, unit), si in units.items()]
+
+
+def _as_norm(quantity: Quantity) -> tuple[re.Match[str] | None, str | None]:
+    """Return the parts of a quantity's name and its unit, as results have them; None where it is no quantity of a result."""
+    named = _NAMED.fullmatch(quantity.name)
+    return named, None if named is None else _SI.get((named["kind"], named["name"]))
+
+
+def _plain(unit: str) -> str:
+    """Return a unit without the marks of a product."""
+    return re.sub(r"[ ·*]", "", unit)
 
 
 _NAMED = re.compile(r"(?P<kind>\w+) (?P<name>\w+)(?: in (?P<movement>.+))? of joint (?P<joint>[1-9]\d*)")

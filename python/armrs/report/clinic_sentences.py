@@ -114,7 +114,8 @@ def quantities(result: Mapping[str, Any]) -> Table:
     rows = []
     for q in result["quantities"]:
         mean = formatting.plus_minus(q["mean"], q["mean_std"])
-        between, within = (formatting.number(q[name], 0.1 * q[name] if q[name] else None) for name in ("between_std", "within_std"))
+        scatter = [q[name] for name in ("between_std", "within_std")]
+        between, within = ("–" if std is None else formatting.number(std, 0.1 * std if std else None) for std in scatter)
         known = [0.25 * (q[name][1] - q[name][0]) for name in ("norm_low_interval", "norm_high_interval")]
         ends = [
             f"{formatting.number(end, std)} ({' … '.join(formatting.number(x, std) for x in q[name])})"

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -68,9 +69,9 @@ class Quantity:
         No side where only one was measured, or not all values have one.
     subjects, sessions : int
     mean, mean_std : float
-    between_std, within_std : float
+    between_std, within_std : float, float or None
         Between subjects, and between sessions of one, of all groups together; a difference of sides differs between subjects as
-        sessions do.
+        sessions do. None where each subject has one session: the first then contains the second.
     norm : (float, float)
         Holds 95 of 100 sessions of other subjects of the group, on that side.
     norm_low_interval, norm_high_interval : (float, float)
@@ -86,7 +87,7 @@ class Quantity:
     mean: float
     mean_std: float
     between_std: float
-    within_std: float
+    within_std: float | None
     norm: tuple[float, float]
     norm_low_interval: tuple[float, float]
     norm_high_interval: tuple[float, float]
@@ -162,9 +163,14 @@ class Cohort(Tabular):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
+        # Without dates, the values of one quantity show how many sessions there were.
+        counts = Counter((v.quantity, v.subject, v.date, v.side) for v in self.values)
+        sessions: Counter[tuple[str, ...]] = Counter()
+        for (_, *session), count in counts.items():
+            sessions[tuple(session)] = max(sessions[tuple(session)], count)
         return {
             "subjects": len({v.subject for v in self.values}),
-            "sessions": len({(v.subject, v.date, v.side) for v in self.values}),
+            "sessions": sessions.total(),
             "quantities": [asdict(q) for q in self.quantities],
             "contrasts": [asdict(c) for c in self.contrasts],
             "level": LEVEL,
@@ -221,7 +227,7 @@ def cohort(
     elif groups is not None:
         raise BadInput("groups", Text("a table beside a table"), "a folder: a table has its own columns group and side")
     else:
-        values, warnings = _of_table(path), []
+        values, warnings = _of_table(path)
     quantities, contrasts = [], []
     names = list(dict.fromkeys(v.quantity for v in values))
     for k, name in enumerate(names):
@@ -305,7 +311,7 @@ def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str, str], 
         mean=mean,
         mean_std=float(np.sqrt(variance)),
         between_std=fitted.between,
-        within_std=fitted.within,
+        within_std=fitted.within if fitted.within_freedom >= 1.0 else None,
         norm=(mean - half, mean + half),
         norm_low_interval=(ends[0] - z * end_std, ends[0] + z * end_std),
         norm_high_interval=(ends[1] - z * end_std, ends[1] + z * end_std),
@@ -352,8 +358,13 @@ def _rows(path: Path, needed: Sequence[str], may: Sequence[str]) -> list[tuple[i
     return rows
 
 
-def _of_table(path: Path) -> list[Value]:
+def _of_table(path: Path) -> tuple[list[Value], list[str]]:
+    """Return the values of a table, and which rows have none."""
     rows, values = _rows(path, NEEDED, MAY), []
+    empty = [number for number, row in rows if row["value"] in text_table.MISSING]
+    rows = [(number, row) for number, row in rows if number not in empty]
+    if not rows:
+        raise BadInput("value", Text("none"), "a value a row", file=path)
     decimal = text_table.decimal_of([row.get(name, "") for _, row in rows for name in ("value", "std")])
     for number, row in rows:
         value = _number(row, "value", (number, path, decimal))
@@ -363,7 +374,8 @@ def _of_table(path: Path) -> list[Value]:
                 raise BadInput(f"row {number}, {name}", Text("nothing"), "a name", file=path)
         words = {name: row.get(name, "") for name in COLUMNS if name not in ("value", "std")}
         values.append(Value(value=value, std=std, **words | {"side": _side(row, number, path)}))
-    return values
+    more = f" and {len(empty) - 1} more" if len(empty) > 1 else ""
+    return values, [f"{path}: row {empty[0]}{more}: no value: left out"] if empty else []
 
 
 def _number(row: Mapping[str, str], name: str, where: tuple[int, Path, str]) -> float:
@@ -434,9 +446,14 @@ def _of_folder(folder: Path, groups: _Groups, tell: Callable[[str, float], None]
             "source", Text("a folder without results and data sets"), "JSON of armrs identify, passive, gap or spasticity", file=folder
         )
     try:
-        values = [v for data in results for v in _of_result(data, groups)]
+        stated = [(data["verb"], v) for data in results for v in _of_result(data, groups)]
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise BadInput("content", Text(f"not what a result holds ({error})"), "whole results", file=folder) from None
+    # `gap` estimates some quantities of `identify` from the same recordings, and a file may be a copy: neither is another session.
+    fitted = {(v.subject, v.side, v.date, v.quantity) for verb, v in stated if verb != "gap"}
+    values = list(dict.fromkeys(v for verb, v in stated if verb != "gap" or (v.subject, v.side, v.date, v.quantity) not in fitted))
+    if len(values) < len(stated):
+        warnings.append(f"{folder}: {len(stated) - len(values)} values that another result of the same session states: left out")
     named = {name for data in results for name in _names(data)}
     return values, [*warnings, *groups.unused(named)]
 

@@ -32,7 +32,7 @@ _FEWEST = 3
 """Rows of numbers that make a table."""
 _TWO_PARTS = ("ZeitInSec", "ZeitInNanoSec")
 """Columns that hold the time of KUKA's DataRecorder."""
-_MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "#NV", "-", "--", "null", "None", "inf", "-inf"]
+MISSING = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "#NV", "-", "--", "null", "None", "inf", "-inf"]
 _NUMBER = {
     ".": re.compile(r"[-+]?(\d+\.?\d*|\.\d+|[1-9]\d{0,2}((,\d{3})+\.\d*|(,\d{3}){2,}))([eE][-+]?\d+)?"),
     ",": re.compile(r"[-+]?(\d+,?\d*|,\d+|[1-9]\d{0,2}((\.\d{3})+,\d*|(\.\d{3}){2,}))([eE][-+]?\d+)?"),
@@ -263,7 +263,7 @@ def _columns(
         if values is not None:
             name = "time" if unit_of_clock and name == f"column {place[1:]}" else name
             columns.append(column(name, values, stated or unit_of_clock))
-        elif any(said := ["" if cell.strip() in _MISSING else cell.strip() for cell in data.column(place).to_pylist()]):
+        elif any(said := ["" if cell.strip() in MISSING else cell.strip() for cell in data.column(place).to_pylist()]):
             remarks += remarks_of(name, said)
     return columns, remarks
 
@@ -274,7 +274,7 @@ def _numbers(cells: Any, decimal: str) -> tuple[np.ndarray | None, str]:
     import pyarrow.compute as pc
 
     plain = pc.utf8_trim_whitespace(cells)
-    known = pc.if_else(pc.is_in(plain, pa.array(_MISSING)), None, plain)
+    known = pc.if_else(pc.is_in(plain, pa.array(MISSING)), None, plain)
     dotted = pc.replace_substring(known, ",", ".") if decimal == "," else known
     if decimal == "," and any(pointed := pc.match_substring(known, ".").to_pylist()):
         marked = pc.match_substring_regex(known, r"^[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?$").to_pylist()
@@ -289,7 +289,7 @@ def _numbers(cells: Any, decimal: str) -> tuple[np.ndarray | None, str]:
 
 def _odd_cells(cells: Any, values: np.ndarray) -> int:
     """Return how many cells hold something that is neither a number nor a mark of a missing value."""
-    return sum(cells[int(k)].as_py().strip() not in _MISSING for k in np.flatnonzero(np.isnan(values)))
+    return sum(cells[int(k)].as_py().strip() not in MISSING for k in np.flatnonzero(np.isnan(values)))
 
 
 def _odd_numbers(cells: list[str | None], decimal: str) -> tuple[np.ndarray | None, str]:
