@@ -273,7 +273,7 @@ def test_tolerances_are_warned_of_at_the_multiples_that_files_md_says() -> None:
 def test_the_tables_of_passive_moments_are_explained_beside_them() -> None:
     """`inertial share`, `upper` and `linear law enough` stood on the terminal without a word."""
     head = tables.passive({"curves": []}).head
-    assert {name.partition(" [")[0] for name in head[4:]} == {"elastic mean", "half width", "± std", "inertial share"}
+    assert {name.partition(" [")[0] for name in head[4:]} == {"elastic mean", "half width", "95 % interval", "inertial share"}
     for name in head[4:]:
         assert name.partition(" [")[0] in common.PASSIVE_MEANING.lower(), name
     for name in (*double_exponential.NAMES, "coupling", "moment", "mean coupling", "linear law"):

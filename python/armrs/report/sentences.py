@@ -19,18 +19,19 @@ if TYPE_CHECKING:
 SYMBOLS_ON_PAGES = SYMBOLS.replace(", l the", ", ℓ the")
 """The same for pages, on which `tables.typeset` sets the names."""
 HISTORY_MEANING = (
-    "What was measured in each session; ± is one standard deviation, without errors that are known to be the same in all sessions. A "
-    "change has the uncertainty of both sessions, from the scatter of their own repeats. Differences between days that are no change of "
-    "the joint, such as another strapping of the arm, are not in this scatter. p is the probability of a difference at least as large "
-    "without a change, corrected for the number of parameters (Holm). A parameter counts as changed if p is below "
+    "What was measured in each session; ± is half of the 95 % interval divided by 1.96, without errors that are the same in all "
+    "sessions: it differs from the standard deviation of this session alone. A change has the uncertainty of both sessions, from the "
+    "scatter of their own repeats. Differences between days that are no change of the joint, such as another strapping of the arm, are not "
+    "in this scatter. p is the probability of a difference at least as large without a change, corrected for the number of parameters "
+    "(Holm). A parameter counts as changed if p is below "
     f"{100.0 * CHANGE_LEVEL:.0f} %."
 )
 PASSIVE_MEANING = (
     "The passive moment is the torque with which a relaxed joint resists: the torque of the contact force minus gravity and inertia, "
     "positive where it acts against a growing angle. Elastic mean: mean of both directions of motion, which also contains errors in the "
-    "masses of the model. Half width: half of their difference, the dissipative part, with its standard deviation over the repeats "
-    "(± std). Inertial share: size of the inertial torque that was subtracted, relative to the moment. Only gravity and inertia of the "
-    "model are subtracted: its springs, friction and other effects remain in these moments."
+    "masses of the model. Half width: half of their difference, the dissipative part, averaged over the angles; its 95 % interval is from "
+    "the scatter of the repeats and the errors that they share. Inertial share: size of the inertial torque that was subtracted, relative "
+    "to the moment. Only gravity and inertia of the model are subtracted: its springs, friction and other effects remain in these moments."
 )
 
 DEPENDENCE_MEANING = (

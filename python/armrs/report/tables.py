@@ -193,7 +193,7 @@ def passive(data: Mapping[str, Any]) -> Table:
             "{:.1f} … {:.1f}".format(c["angle_deg"][0], c["angle_deg"][-1]),
             f"{c['elastic_mean_Nm']:.4g}",
             f"{c['half_width_mean_Nm']:.3g}",
-            "–" if c["half_width_std_mean_Nm"] is None else f"{c['half_width_std_mean_Nm']:.2g}",
+            _ends(c.get("half_width_whole_interval_Nm", c["half_width_interval_Nm"])),
             f"{100 * c['inertial_share']:.1f}",
         ]
         for c in data["curves"]
@@ -205,10 +205,18 @@ def passive(data: Mapping[str, Any]) -> Table:
         "angles [°]",
         "elastic mean [N m]",
         "half width [N m]",
-        "± std [N m]",
+        "95 % interval [N m]",
         "inertial share [%]",
     ]
     return Table(head, rows, left=2)
+
+
+def _ends(interval: Sequence[float | None]) -> str:
+    """Write an interval; a single repeat has none."""
+    low, high = interval
+    if low is None or high is None or not math.isfinite(high - low):
+        return "–"
+    return " … ".join(number(end, 0.25 * (high - low)) for end in (low, high))
 
 
 def dependence(data: Mapping[str, Any]) -> Table:
