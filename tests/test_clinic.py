@@ -375,6 +375,24 @@ def test_a_held_joint_is_not_advised_to_move_slowly() -> None:
     assert said.startswith("Move the shoulder more slowly") and clinic_page.notes([fast]) == []
 
 
+def test_the_activity_of_a_reflex_is_nothing_to_correct() -> None:
+    """A page advised to correct the muscle activity of the reflex that it had found, before the next session."""
+    active = {"name": "muscles silent", "passed": False, "text": "Not silent: emg_flexor rises to 2.3 times its median"}
+    passive = slow_result(("stretch", 2, 80.0, True)) | {"checks": [active]}
+    beside = result(verb="spasticity", effects=[{"kind": "stretch_reflex", "joint": 2, "decided": False, "parameters": {}}])
+    assert clinic_next.faults([passive, beside]) == ["Not silent: emg_flexor rises to 2.3 times its median."]
+    beside["effects"][0]["decided"] = True
+    assert clinic_next.faults([passive, beside]) == []
+
+
+def test_a_held_joint_was_not_moved_through_a_range() -> None:
+    """It read `shoulder from −45° to −45°`."""
+    told = result()
+    told["data"] = told["data"] | {"range_deg": [[-45.2, -44.8], [30.0, 120.0]]}
+    (said,) = [line for line in clinic_page.measured([told]) if line.startswith("Range")]
+    assert "shoulder held at −45°, elbow from 30° to 120°" in said
+
+
 def test_the_interval_of_a_slow_movement_has_the_errors_of_the_masses() -> None:
     """With masses 3 % off, the interval of the repeats excluded the true stiffness."""
     half_width, stiffness = clinic_lines.lines_of(slow_result(("slow", 2, 80.0, True)))

@@ -224,7 +224,8 @@ def measured(results: Sequence[Mapping[str, Any]]) -> list[str]:
         for j, (joint, ends) in enumerate(zip(data["joints"], ranges, strict=True), start=1):
             sign, zero = laboratory(results[0], j)
             low, high = sorted(sign * (end - zero) for end in ends)
-            said.append(f"{joint} from {low:.0f}° to {high:.0f}°".replace("-", "−"))
+            moved = f"from {low:.0f}° to {high:.0f}°" if round(low) < round(high) else f"held at {low:.0f}°"
+            said.append(f"{joint} {moved}".replace("-", "−"))
         lines.append(f"Range that was moved through: {', '.join(said)}. This is no test of how far the joints can go.")
     return [*lines, f"Angles: {(data.get('angles') or {}).get('words', ZERO)}."]
 

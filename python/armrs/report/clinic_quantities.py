@@ -63,7 +63,7 @@ SLOW = (
     Quantity(
         "passive",
         "stiffness",
-        "Stiffness, slow movement",
+        "Stiffness in slow movement",
         "how much more the joint pulls back for every 10° further; errors in the assumed weight of the arm can make it negative",
         "N m per 10°",
         math.pi / 18.0,
