@@ -466,6 +466,18 @@ def test_forces_in_another_unit_are_not_taken_for_another_convention(
     assert words in str(refused.value)
 
 
+def test_kilograms_force_are_told_where_a_convention_is_taken_or_contradicted(recording: Recording, tmp_path: Path) -> None:
+    """They were imported in a wrong convention without a hint, and who stated the right one was advised not to."""
+    path = write_text(tmp_path / "slow_1.csv", *table(recording, names=SI, force=1.0 / 9.80665))
+    said = "forces stated in N that are kgf? Then 0."
+    with pytest.warns(armrs.ArmrsWarning, match=re.escape(said)):
+        armrs.import_recordings([path], tmp_path / "set", model=KNOWN)
+    stated = {"angles": "relative", "zero": "horizontal", "clockwise": (), "force_on": "robot"}
+    with pytest.raises(BadInput, match="in every convention that agrees with it") as refused:
+        armrs.import_recordings([path], tmp_path / "again", model=KNOWN, **stated)
+    assert said in str(refused.value) and "leave the option out" not in str(refused.value)
+
+
 def test_noise_is_no_other_unit(recording: Recording, tmp_path: Path) -> None:
     names, values = table(recording, names=SI)
     values[:, 3:] = np.random.default_rng(1).standard_normal((len(values), 2))

@@ -226,8 +226,8 @@ def import_(
 
     Separators, decimal commas, encodings, units and columns are recognised. The angle convention and the body on which the force acts
     are inferred from the balance of the arm, unless options state them. Every decision is printed and saved in import.toml, which
-    repeats the import. Exit status 1 if the clock of a force recording is in doubt, or if more than 10 % of the contact torques remain
-    unexplained: the data set is written, and a line states the doubt.
+    repeats the import. Exit status 1 if the clock of a force recording or the unit of forces is in doubt, or if more than 10 % of the
+    contact torques remain unexplained: the data set is written, and a line states the doubt.
     """
     from ..io.dataset import load_dataset
     from ..report.recording import write_recording

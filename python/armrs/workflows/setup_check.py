@@ -172,11 +172,15 @@ class Weight:
     std: float
     apart: float
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Mistakes in the unit of the forces that would give such a factor."""
+        return tuple(words for ratio, words in OTHER_UNITS if abs(self.factor / ratio - 1.0) < _SAME_UNIT)
+
     def __str__(self) -> str:
         factor = plus_minus(self.factor, self.std)
         found = f"the movements ask for {factor} times the masses and first moments of the model, in all segments"
-        units = [words for ratio, words in OTHER_UNITS if abs(self.factor / ratio - 1.0) < _SAME_UNIT]
-        causes = " or ".join([*units, "a wrong body mass", "a mass that the model lacks"])
+        causes = " or ".join([*self.units, "a wrong body mass", "a mass that the model lacks"])
         return f"{found}, {self.apart:.1f} standard deviations from one, the model's own uncertainty counted: {causes}?"
 
 

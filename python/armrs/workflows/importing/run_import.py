@@ -14,13 +14,14 @@ import numpy as np
 from ... import checks
 from ...errors import BadInput, BadInputs, Sentence, Text, unknown_name
 from ...io import files
-from ...io.dataset import load_dataset
+from ...io.dataset import Dataset, load_dataset
 from ...io.raw import RawTable
 from ...io.raw.units import unit
 from ...io.samples import write_samples
 from ...model import Description, Model, Robot, Subject, Tolerance, TrialEntry, load_model
 from ...result_warnings import with_warnings
 from ...tabular import Tabular, Tidy
+from ..setup_check import other_weight
 from . import column_guess, conventions, file_remarks, file_roles, force_alignment, handle_positions
 from . import raw_tables as raw
 from .column_guess import symbol_of
@@ -161,7 +162,11 @@ def import_recordings(
     recipe = changed(recipe, trials=tuple(changed(t, remarks=r.trial.remarks) for t, r in zip(recipe.trials, reads, strict=True)))
     loaded, said = _led(loaded, recipe, reads)
     tell("writing", _DECIDED)
-    return Imported(_write(files.output_folder(out), former, loaded, recipe, reads, about), recipe, (*notes, *said), tuple(doubts))
+    folder = files.output_folder(out)
+    # Springs and constant moments may balance forces in another unit where the movements are small: the weight then shows it.
+    weight = other_weight(_write(folder, former, loaded, recipe, reads, about))
+    doubts += [str(weight)] if weight is not None and weight.units else []
+    return Imported(folder, recipe, (*notes, *said), tuple(doubts))
 
 
 def _is_recipe(paths: Sequence[Path]) -> bool:
@@ -469,9 +474,10 @@ def _reread(recipe: Recipe, folder: Path) -> list[LoadedTrial]:
     return reads
 
 
-def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[LoadedTrial], about: _About) -> Path:
-    """Write the data set whole or not at all, with `import.toml` in it, and remove the other trials of a former import."""
+def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: Sequence[LoadedTrial], about: _About) -> Dataset:
+    """Write the data set whole or not at all, with `import.toml` in it, without other trials of a former import, and return it."""
     kept = changed(recipe, trials=tuple(_relative_to(folder, read.trial) for read in reads))
+    datasets = []
 
     def write(part: Path) -> list[Path]:
         written = []
@@ -489,7 +495,7 @@ def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: 
         files.write_text(part / "dataset.toml", content.to_toml(), kind=".toml")
         files.write_text(part / FILE, kept.to_toml(), kind=".toml")
         try:
-            load_dataset(part)
+            datasets.append(load_dataset(part))
         except BadInput as error:  # what could not be read again is not written
             problems = error.problems if isinstance(error, BadInputs) else (error,)
             raise BadInputs.of([p.within(file=folder / Path(p.file or part).relative_to(part)) for p in problems]) from None
@@ -498,7 +504,7 @@ def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: 
     written = files.write_whole(folder, write)
     for name in former - {path.relative_to(folder).as_posix() for path in written}:
         (folder / name).unlink(missing_ok=True)
-    return folder
+    return datasets[0]
 
 
 def _former(folder: Path, replaced: bool) -> set[str]:
