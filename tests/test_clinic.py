@@ -119,7 +119,7 @@ def test_what_changed_is_said_first_with_how_sure_it_is(norms: tuple[clinic_norm
     lines = clinic_lines.lines_of(result(history=[change, same]), norms)
     assert session_changes.change_lines(lines) == [
         "shoulder: stiffness is higher by 0.157 ± 0.048 N m per 10° (+100 %).",
-        session_changes.SURE,
+        session_changes.SURE["change"],
         "No clear change: shoulder (friction).",
         session_changes.EITHER_WAY,
     ]
@@ -173,12 +173,25 @@ def test_a_page_names_the_sessions_that_it_compares(tmp_path: Path) -> None:
         clinic_page.write_summary([tmp_path / "a.json", tmp_path / "b.json"], tmp_path / "s.html")
 
 
+def test_a_clear_difference_between_arms_is_said_with_its_certainty_and_what_next() -> None:
+    """A page that compares arms alone stated neither: with a clear difference it had no `What next` at all."""
+    found = kept(before=None, other_arm=compared(0.6, 0.14, clear=True, date="2026-02-28"))
+    lines = clinic_lines.lines_of(found)
+    ((_, said),) = clinic_page.answers([found], lines)
+    assert said[1] == "How sure: if the arms did not differ, each analysis would still report a difference in 1 of 50 sessions."
+    assert clinic_next.next_steps([found], lines) == [
+        "Repeat the session within days before acting on a difference between the arms: strapping and posture differ from day to day."
+    ]
+
+
 def test_what_is_beyond_its_own_interval_alone_is_called_perhaps() -> None:
     """A change larger than its ± stood beside `no clear change`."""
     (line, *_) = clinic_lines.lines_of(kept(before=compared(0.3, 0.14, clear=False, date="2026-02-02")))
     assert line.trend == "perhaps higher: +0.052 ± 0.048"
     said = session_changes.change_lines([line])
     assert said[0].startswith("Perhaps: shoulder: stiffness +0.052 ± 0.048 N m per 10°. This is more than its ±, but")
+    # It read `+0.022 ± 0.022`, and that the one is more than the other.
+    assert session_changes.trend(0.0224, 0.0216, None, clear=False) == "perhaps higher: +0.0224 ± 0.0216"
 
 
 def test_repeats_that_make_a_change_certain_are_computed_from_its_deviation() -> None:

@@ -27,8 +27,12 @@ FEWEST_FAST = 2
 def next_steps(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list[str]:
     """Return measurements that would decide what is open, the first that comes first."""
     said = [*_correct(results), *_slower(results), *_faster(results), *_repeats(results, lines)]
-    if any(line.before is not None and line.before.clear for line in lines):
-        said.append("Repeat the session within days before acting on a change: strapping and posture differ from day to day.")
+    compared = (("change", "before"), ("difference between the arms", "other_arm"))
+    clear = [what for what, name in compared if any(c.clear for line in lines if (c := getattr(line, name)) is not None)]
+    if clear:
+        said.append(
+            f"Repeat the session within days before acting on a {' or a '.join(clear)}: strapping and posture differ from day to day."
+        )
     if lines and not any(result.get("session") or result.get("history") for result in results):
         said.append("Keep the sessions of this person in one file (--history FILE): the next page then states what changed.")
     return [*said, *_other_arm(results, lines)]

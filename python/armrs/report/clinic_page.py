@@ -159,7 +159,7 @@ def answers(results: Sequence[Mapping[str, Any]], lines: Sequence[Line]) -> list
     return said
 
 
-_ONCE = (session_changes.SURE, session_changes.EITHER_WAY)
+_ONCE = (session_changes.SURE["change"], session_changes.EITHER_WAY)
 
 
 def estimates(lines: Sequence[Line], results: Sequence[Mapping[str, Any]]) -> str:

@@ -11,7 +11,10 @@ from ..analysis.significance import CHANGE_LEVEL
 from ..formatting import two_digits
 
 NO_CHANGE, PERHAPS = "no clear change", "perhaps"
-SURE = f"How sure: if nothing had changed, each analysis would still report a change in 1 of {1.0 / CHANGE_LEVEL:.0f} sessions."
+SURE = {
+    what: f"How sure: if {none}, each analysis would still report a {what} in 1 of {1.0 / CHANGE_LEVEL:.0f} sessions."
+    for what, none in (("change", "nothing had changed"), ("difference", "the arms did not differ"))
+}
 EITHER_WAY = "The number after ± is half of a 95 % interval."
 
 
@@ -86,6 +89,8 @@ def trend(change: float, either_way: float, before: float | None, *, clear: bool
     """Describe a change: by how much, both with the digits of its uncertainty, and as a share of `before`, where that means something."""
     size = either_way if either_way > 0.0 and math.isfinite(either_way) else abs(change)
     decimals = two_digits(size) if size > 0.0 else 0
+    if abs(change) > either_way:  # what is called more than its ± must read so
+        decimals = next((d for d in range(decimals, 18) if f"{abs(change):.{d}f}" != f"{either_way:.{d}f}"), decimals)
     width = f"{either_way:.{decimals}f}"
     way = "higher" if change > 0.0 else "lower"
     if not clear:
@@ -111,8 +116,8 @@ def change_lines(
             way, _, rest = told.partition(" by ")
             since = "" if change.date == date else f", compared with {change.date}"
             lines.append(f"{_named(row)} is {way}{than} by {rest} {row.quantity.unit}{share and f' ({share}'}{since}.")
-    if lines and what == "change":
-        lines.append(SURE)
+    if lines:
+        lines.append(SURE[what])
     for row, change in followed:
         if change.perhaps:
             told = change.words.partition(": ")[2]
