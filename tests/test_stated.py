@@ -280,6 +280,12 @@ def test_the_tables_of_passive_moments_are_explained_beside_them() -> None:
         assert name.rpartition("_")[2] in common.DEPENDENCE_MEANING.lower().replace("mean\ncoupling", "mean coupling"), name
 
 
+def test_a_history_without_quantities_is_not_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    """The meaning of a table stood where there was none."""
+    common.followed({"history": []})
+    assert capsys.readouterr().out == ""
+
+
 def test_the_summary_of_an_identification_counts_what_its_tables_show() -> None:
     """It said 6 of 8, the first table had 4 rows, and 3 of the parameters were measured."""
     item = {"name": "m1", "kind": "segment", "joint": 1, "value": 2.0, "std": 0.1, "interval": (1.8, 2.2), "unit": "kg", "caveat": None}

@@ -255,7 +255,7 @@ def sticking_lines(result: Mapping[str, Any]) -> list[str]:
 
 def followed(result: Mapping[str, Any]) -> None:
     """Print the history that a result was added to."""
-    if "history" in result:
+    if result.get("history"):
         show("Over the sessions, what the data decided in the last one", tables.history(result["history"]))
         print(f"{HISTORY_MEANING}\n")
 

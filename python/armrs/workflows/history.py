@@ -198,7 +198,8 @@ def _foreseen(file: Path, result: Followed, subject: str, date: str) -> History:
                 connection.backup(memory)
         session, replaced = _write(memory, result, subject, date, file)
         if session is None:
-            line = f"history: no quantity of {show(result.dataset.name)} on {date} has an interval (no repeats?): it is not added"
+            why = "no repeats, or no slow movement?"
+            line = f"history: no quantity of {show(result.dataset.name)} on {date} has an interval ({why}): it is not added"
             return History(subject, (), (line,), date, result.dataset.subject.side)
         found = history_of(memory, result.method, _whose(memory), session)
         if not replaced:
