@@ -59,7 +59,7 @@ def test_without_a_reflex_none_is_found() -> None:
 
 def test_a_law_that_drives_the_joint_is_no_reflex() -> None:
     """A shoulder that moved by two degrees beside a stretched elbow had a reflex from 0 rad/s on, with a viscosity of -1.1 N m s/rad."""
-    data = patients.session(Patient(), SEED)
+    data = patients.session(Patient(), SEED, emg=True)
     driven = [
         dataclasses.replace(trial, tau=trial.tau - 2.0 * np.gradient(trial.q[:, 0], trial.t)[:, None])  # type: ignore[operator]
         for trial in data.trials
@@ -67,6 +67,8 @@ def test_a_law_that_drives_the_joint_is_no_reflex() -> None:
     found = armrs.spasticity(data.replace(trials=tuple(driven)))
     assert found.joints[0].reflex.viscosity.interval[1] < 0.0 and not found.joints[0].reflex.found
     assert "no reflex was found" in found.warnings[0] and "no passive joint drives itself" in found.warnings[0]
+    # The table had a latency of muscle activity, from the threshold of the reflex that was not found.
+    assert np.isnan([s.emg_latency for s in found.joints[0].stretches]).all()
 
 
 def test_a_joint_that_moves_with_a_stretched_one_is_not_stretched() -> None:

@@ -66,7 +66,7 @@ class MeasuredStretch:
     emg_onset : float
         Time from the start of the stretch to the first activity of a muscle [s]; NaN without one.
     emg_latency : float
-        Time from the speed's passing the threshold to that activity [s]; NaN as above.
+        Time from the speed's passing the threshold to that activity [s]; NaN as above, and without a reflex.
     co_contraction : float
         Co-contraction of antagonists, 0 to 1; NaN where no pair of them is recorded, see `armrs.io.muscle_activity`.
     active : tuple of str
@@ -343,7 +343,7 @@ def _measured_stretch(moments: TrialMoments, stretch: Stretch, fitted: Reflex, n
         catch_angle=np.nan if begun is None else float(stretch.q[begun]),
         catch_speed=np.nan if begun is None else float(along[begun]),
         emg_onset=float(emg - stretch.t[first]),
-        emg_latency=float(emg - passed),
+        emg_latency=float(emg - passed) if fitted.found else np.nan,
         co_contraction=np.nan if both is None else both,
         active=tuple(sorted(onsets, key=lambda name: onsets[name])),
     )
@@ -355,7 +355,8 @@ def _doubts(name: str, fitted: Reflex, fastest: float) -> list[str]:
     said = []
     if not fitted.found:
         drives = "; viscosity or dry friction would have to be below zero beside one, and no passive joint drives itself"
-        return [f"{name}: no reflex was found up to {fastest:.2g} rad/s{drives if fitted.parameters['gain'].interval[0] > 0.0 else ''}"]
+        why = drives if fitted.parameters["gain"].interval[0] > 0.0 else ""
+        return [f"{name}: no reflex was found up to {np.degrees(fastest):.0f} °/s{why}"]
     if threshold.value < 0.02 * fastest:
         said.append(f"{name}: the threshold of the reflex is close to zero: it cannot be distinguished from a viscosity in one direction")
     if latency.interval[1] > 0.95 * stretch_reflex.LONGEST:
