@@ -418,3 +418,32 @@ def test_the_range_of_a_protocol_is_not_tested_for_a_change() -> None:
     assert half_width.p_value == pytest.approx(courses.change(points)[2]) and half_width.changed
     assert np.isnan([moved.p_value, moved.change, moved.before.p_value, moved.first.p_value, moved.other_arm.p_value]).all()
     assert not moved.changed and moved.values.tolist() == [1.0, 1.4]
+
+
+def test_movements_of_other_speeds_are_not_compared(tmp_path: Path) -> None:
+    """What resists depends on the speed: a changed protocol looked like a change of the joint."""
+    from armrs.workflows import courses
+
+    def history_at(*speeds: float) -> courses.History:
+        with contextlib.closing(sqlite3.connect(tmp_path / f"{speeds[-1]}.sqlite")) as file:
+            file.executescript(
+                "CREATE TABLE session (id INTEGER PRIMARY KEY, name, date, method, joints);"
+                "CREATE TABLE arm (session, side, recording_sha256);"
+                "CREATE TABLE estimate (session, name, kind, joint, value, std, unit, decided_by);"
+            )
+            for k, speed in enumerate(speeds, start=1):
+                file.execute("INSERT INTO session VALUES (?, 's', ?, 'passive', 2)", (k, f"2026-0{k}-05"))
+                for name, value, unit in (("half_width", 0.2 + 0.2 * speed, "N m"), ("speed", speed, "rad/s")):
+                    row = (k, f"{name} in slow", "passive", 2, value, 0.003, unit, "data")
+                    file.execute("INSERT INTO estimate VALUES (?, ?, ?, ?, ?, ?, ?, ?)", row)
+            return courses.history_of(file, "passive", "anna")
+
+    other = history_at(0.435, 0.43, 0.6)
+    half_width, speed = other.courses
+    assert np.isnan(half_width.change) and half_width.before.date is None and not speed.changed
+    line = "history, slow: found another speed of joint 2 on 2026-01-05, 2026-02-05, allowed that of this session up to 10 %: not compared"
+    assert other.warnings == (line,)
+    alike = history_at(0.435, 0.43, 0.45)
+    assert alike.courses[0].before.date == "2026-02-05" and alike.warnings == ()
+    # A joint that is held creeps at any speed.
+    assert history_at(0.012, 0.02, 0.03).warnings == ()

@@ -90,7 +90,9 @@ def test_a_stretch_as_wide_as_the_low_pass_is_not_slow(slow_arm: Path) -> None:
     assert not fast.slow and fast.bandwidth == pytest.approx(99.0 / 91.3, rel=0.1)
     (said,) = [line for line in result.warnings if "fast: not slow for joint 2" in line]
     assert said.endswith("the bandwidth of the movement is 1.1 Hz, and the low-pass is at 1 Hz")
-    assert {e.name for e in result.followed() if e.joint == 2} == {"half_width in slow", "stiffness in slow", "range in slow"}
+    assert {e.name for e in result.followed() if e.joint == 2} == {
+        f"{name} in slow" for name in ("half_width", "stiffness", "range", "speed")
+    }
     check = result.checks[1]
     assert check.passed is False and check.text.startswith("Not slow: the bandwidth of a movement is 1.1 Hz")
 

@@ -13,10 +13,11 @@ import pytest
 import armrs
 import patients
 from armrs import BadInput
+from armrs.analysis.stretch_reflex import Estimated
 from armrs.analysis.stretch_sessions import stretched_joint
 from armrs.cli import main
 from armrs.io import tomlfile
-from armrs.io.muscle_activity import onset
+from armrs.io.muscle_activity import mark_activity, onset
 from armrs.model import Effect, Model
 from armrs.report import clinic_figures, plotting
 from armrs.workflows.plan import Instruments, Limits
@@ -49,6 +50,29 @@ def test_patients_of_the_virtual_laboratory_are_recovered() -> None:
         assert value["gain"] == pytest.approx(patient.gain, rel=0.1)
         assert value["threshold"] == pytest.approx(patient.threshold, rel=0.1)
         assert value["latency"] == pytest.approx(patient.latency, abs=5e-3)
+
+
+@pytest.mark.parametrize("seed", [SEED, SEED + 1])
+def test_a_burst_in_a_slow_stretch_moves_no_estimate_by_a_tenth_of_its_interval(seed: int) -> None:
+    """It moved the onset by a third: the muscle is active at a speed at which no reflex acts, so what it does is its own."""
+    data = patients.session(Patient(), seed, emg=True)
+    place = next(k for k, trial in enumerate(data.trials) if trial.file == "v0_2.csv")
+    calm, draw = data.trials[place], np.random.default_rng(seed)
+    assert calm.tau is not None
+    at = (calm.t > 4.0) & (calm.t < 4.6)
+    push = np.where(at, np.sin(np.pi * (calm.t - 4.0) / 0.6) ** 2, 0.0)[:, None]
+    emg = {name: np.where(at, 60.0 * draw.standard_normal(len(at)), values) for name, values in calm.emg.items()}
+    trials = list(data.trials)
+    trials[place] = dataclasses.replace(calm, tau=calm.tau + push, emg=emg)
+
+    def found(trials: list[armrs.Trial]) -> dict[str, Estimated]:
+        reflex = armrs.spasticity(data.replace(trials=tuple(mark_activity(trials)[0]))).joints[0].reflex
+        return {**reflex.parameters, "viscosity": reflex.viscosity, "dry": reflex.dry}
+
+    without, burst = found(list(data.trials)), found(trials)
+    for name in ("gain", "threshold", "latency", "viscosity", "dry"):
+        width = without[name].interval[1] - without[name].interval[0]
+        assert abs(burst[name].value - without[name].value) < 0.1 * width, name
 
 
 def test_without_a_reflex_none_is_found() -> None:

@@ -141,7 +141,7 @@ def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:
     t = np.arange(0.0, 20.0, 0.01)
     q = np.column_stack([np.sin(t)])
     seen = SimpleNamespace(
-        trial=SimpleNamespace(role="fit"), q=q, qd=np.column_stack([np.cos(t)]), torque=1e-9 * q, valid=lambda: np.full(len(t), True)
+        trial=SimpleNamespace(role="fit"), q=q, qd=np.column_stack([np.cos(t)]), torque=1e-9 * q, valid=lambda _: np.full(len(t), True)
     )
     with plotting.style():
         figure = figures.missing_torque(["elbow"], {"calibrated": [seen, seen]}).figure  # type: ignore[list-item]

@@ -2,10 +2,11 @@
 
 `R = offset + k1 x + … + k5 x⁵ + b q̇ + c sign(q̇) + ΔI q̈ + s·gain·max(0, s q̇(t−L) − threshold − slope·max(0, s (tonic − q(t−L))))`,
 x the angle from its mean, s = ±1 the direction of the stretch, with an offset of its own in every trial, as tone drifts. At rest the moment
-is free, as dry friction holds a joint with any torque up to its own. The law is that of the effect `stretch_reflex` (Lance 1980; Levin and
-Feldman 1994). For given threshold, latency, tonic angle and slope the rest is linear: variable projection (Golub and Pereyra 1973).
-Intervals, linearised at the optimum, are from the scatter of the trials (`cluster_robust`), so that neither the colour of the noise nor
-what differs from trial to trial has to be modelled, and from the errors that all trials share.
+is free, as dry friction holds a joint with any torque up to its own, and so it is where muscles are active that no reflex drives. The law
+is that of the effect `stretch_reflex` (Lance 1980; Levin and Feldman 1994). For given threshold, latency, tonic angle and slope the rest is
+linear: variable projection (Golub and Pereyra 1973). Intervals, linearised at the optimum, are from the scatter of the trials
+(`cluster_robust`), so that neither the colour of the noise nor what differs from trial to trial has to be modelled, and from the errors
+that all trials share.
 """
 
 from __future__ import annotations
@@ -32,6 +33,10 @@ HELD = 0.1
 """Time for which what holds a joint at rest is taken as constant, and for which an oscillation is no movement [s]."""
 ELASTIC = 5
 """Degree of the polynomial that describes the springs of a joint."""
+AFTER = 2.0 * LONGEST
+"""Time for which a muscle may be active after a movement faster than the threshold of its reflex: latency, twitch and envelope [s]."""
+BELOW = 0.8
+"""Share of the threshold below which no speed sets off a reflex: an estimated threshold is that good."""
 _SLIGHT = 1e-3
 """Size beside the largest below which an unknown of a trial is rounding."""
 SHAPES = ("threshold", "latency", "tonic", "slope")
@@ -60,6 +65,10 @@ class Stretch:
         The same of errors that the trials of one session share: of markers, which are placed anew for the next.
     misread : ndarray, shape (n_errors, n)
         What the latter do to the angle [rad], and so to the input speed of the reflex.
+    active : ndarray of bool, shape (n,)
+        Where muscles are active.
+    voluntary : ndarray of bool, shape (n,)
+        Where they are, and no reflex drives them: the moment is free there.
     edge : int
         Samples at each end that are not fitted: a low-pass has one side of them only. A reflex still depends on their motion.
     """
@@ -76,25 +85,31 @@ class Stretch:
     shared: np.ndarray = field(repr=False)
     placed: np.ndarray = field(repr=False)
     misread: np.ndarray = field(repr=False)
+    active: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool), repr=False)
+    voluntary: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool), repr=False)
     edge: int = 0
 
     @cached_property
     def rests(self) -> tuple[slice, ...]:
         """The samples of each rest; one that a swing shorter than `HELD` interrupts is one rest."""
-        still = np.flatnonzero(np.abs(self.fine_qd) < RESTING)
-        if not still.size:
+        return self._runs(np.abs(self.fine_qd) < RESTING)
+
+    def _runs(self, those: np.ndarray) -> tuple[slice, ...]:
+        """Return the stretches of flagged samples; what interrupts one for less than `HELD` belongs to it."""
+        flagged = np.flatnonzero(those)
+        if not flagged.size:
             return ()
-        parts = np.split(still, np.flatnonzero(np.diff(self.t[still]) > HELD) + 1)
+        parts = np.split(flagged, np.flatnonzero(np.diff(self.t[flagged]) > HELD) + 1)
         return tuple(slice(own[0], own[-1] + 1) for own in parts)
 
     @cached_property
     def unknown(self) -> np.ndarray:
-        """An orthonormal basis of the unknowns of a trial: its offset, and what dry friction holds at rest, (n_fitted, k).
+        """An orthonormal basis of the unknowns of a trial, (n_fitted, k): its offset, what dry friction holds at rest, voluntary torque.
 
-        That changes as the joint creeps: it has a level of its own every `HELD`.
+        These change as the joint creeps and the muscle twitches: they have a level of their own every `HELD`.
         """
         held = []
-        for rest in self.rests:
+        for rest in (*self.rests, *self._runs(self.voluntary)):
             part = ((self.t[rest] - self.t[rest.start]) / HELD).astype(int)
             for k in np.unique(part):
                 column = np.zeros(len(self.t))
@@ -111,6 +126,13 @@ class Stretch:
         """Return the samples that are fitted, (n,) or (n, m), less the unknowns of the trial."""
         inner = self.inner(values)
         return np.asarray(inner - self.unknown @ (self.unknown.T @ inner))
+
+    def without_voluntary(self, direction: int, threshold: float) -> Stretch:
+        """Return the stretch with the moment free where muscles are active and no reflex with this threshold [rad/s] acts or has acted."""
+        past = round(AFTER / (self.t[1] - self.t[0]))
+        speed = np.concatenate([np.zeros(past), direction * self.fine_qd])
+        fastest = np.lib.stride_tricks.sliding_window_view(speed, past + 1).max(axis=1)
+        return replace(self, voluntary=self.active & (fastest < BELOW * threshold))
 
     def moved_by(self, error: np.ndarray) -> Stretch:
         """Return the stretch with an error of the angle, (n,) [rad]."""
@@ -186,6 +208,14 @@ def fit(stretches: Sequence[Stretch]) -> Reflex | None:
     """Fit the reflex of one joint to its stretches; None where there are too few."""
     if len(stretches) < FEWEST:
         return None
+    found = _fitted(stretches)
+    if not found.found or not any(s.active.any() for s in stretches):
+        return found
+    passive = [s.without_voluntary(found.direction, found.parameters["threshold"].value) for s in stretches]
+    return _fitted(passive) if any(s.voluntary.any() for s in passive) else found
+
+
+def _fitted(stretches: Sequence[Stretch]) -> Reflex:
     problem = _Problem(stretches)
     direction, shape = min((problem.start(direction) for direction in (1, -1)), key=lambda s: problem.cost(*s))
     shape = problem.refined(direction, shape, 2)

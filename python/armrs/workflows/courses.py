@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 _TOGETHER = ("joint", "cascade")
 """Methods that estimate all parameters of a joint together."""
+CHOSEN = ("range in ", "speed in ")
+"""What is kept of a slow movement and was chosen: it is shown, and not tested for a change."""
+SAME_SPEED, LEAST_SPEED = 0.1, 0.02
+"""Share by which the speed of a movement may differ between sessions that compare, and what it may differ by in any case [rad/s]."""
 _ROWS = (
     "SELECT e.name, e.kind, e.joint, e.unit, s.date, e.value, e.std, s.id, coalesce(a.side, '') FROM estimate e "
     "JOIN session s ON s.id = e.session LEFT JOIN arm a ON a.session = s.id "
@@ -207,13 +211,17 @@ def history_of(connection: sqlite3.Connection, method: str, subject: str | None,
     points, elsewhere = _by_parameter(same), _by_parameter(there)
     followed = {key: own_points for key, own_points in points.items() if own_points[-1][3] == session}
     decided = _decided(known) if method in _TOGETHER else None
-    alike = [_comparable(own_points, own_points[-1], key[2], decided) for key, own_points in followed.items()]
-    others = [
-        [*_comparable(elsewhere.get(key, ()), own_points[-1], key[2], decided)[-1:], own_points[-1]] for key, own_points in followed.items()
-    ]
+    slower = _at_other_speeds({**points, **{key: [*points.get(key, ()), *more] for key, more in elsewhere.items()}}, followed)
+
+    def compare(key: _Key, with_points: Sequence[_Point]) -> list[_Point]:
+        alike = _comparable(with_points, followed[key][-1], key[2], decided)
+        return [p for p in alike if p[3] not in slower.get((key[0].partition(" in ")[2], key[2]), ())]
+
+    alike = [compare(key, own_points) for key, own_points in followed.items()]
+    others = [[*compare(key, elsewhere.get(key, ()))[-1:], own_points[-1]] for key, own_points in followed.items()]
     courses = _courses(followed, alike, others)
     later = tuple(dict.fromkeys(row[4] for row in rows if row[8] == side and (row[4], row[7]) > (date, session)))
-    warnings = (*_in_other_units(points, followed), *_without_side(rows, side), *_not_last(date, later))
+    warnings = (*_in_other_units(points, followed), *_without_side(rows, side), *_faster(slower, known), *_not_last(date, later))
     return History(subject, courses, warnings, date, side or None, later)
 
 
@@ -239,12 +247,26 @@ def _comparable(points: Sequence[_Point], last: _Point, joint: int, decided: _De
     return [p for p in points if decided is None or decided[p[3], joint] == decided[last[3], joint]]
 
 
+def _at_other_speeds(
+    points: Mapping[_Key, Sequence[_Point]], followed: Mapping[_Key, Sequence[_Point]]
+) -> dict[tuple[str, int], list[int]]:
+    """Return by slow movement and joint the sessions in which it had another speed than in the last one: what resists depends on it."""
+    found: dict[tuple[str, int], list[int]] = {}
+    for key, own in followed.items():
+        quantity, _, movement = key[0].partition(" in ")
+        if key[1] != "passive" or quantity != "speed":
+            continue
+        now = own[-1][1]
+        if other := [p[3] for p in points[key] if abs(p[1] - now) > max(SAME_SPEED * now, LEAST_SPEED)]:
+            found[movement, key[2]] = other
+    return found
+
+
 def _courses(
     followed: Mapping[_Key, Sequence[_Point]], alike: Sequence[Sequence[_Point]], others: Sequence[Sequence[_Point]]
 ) -> tuple[Course, ...]:
-    # How far a joint was moved was chosen: it is shown, and not tested.
     alike, others = (
-        [p[-1:] if key[1] == "passive" and key[0].startswith("range in ") else p for key, p in zip(followed, each, strict=True)]
+        [p[-1:] if key[1] == "passive" and key[0].startswith(CHOSEN) else p for key, p in zip(followed, each, strict=True)]
         for each in (alike, others)
     )
     tests = [change(points) for points in alike]
@@ -306,6 +328,17 @@ def _without_side(rows: Sequence[_Row], side: str) -> tuple[str, ...]:
         return (f"history, side: found none on {dates}, allowed {side} as in this session: not compared; {step}",)
     stated = " and ".join(sorted({row[8] for row in others}))
     return (f"history, side: found none in this session, allowed {stated} as on {dates}: not compared; state side in [subject]",)
+
+
+def _faster(slower: Mapping[tuple[str, int], Sequence[int]], rows: Sequence[_Row]) -> list[str]:
+    """Return which sessions are left out since a slow movement had another speed."""
+    date = {row[7]: row[4] for row in rows}
+    lines = []
+    for (movement, joint), sessions in slower.items():
+        dates = ", ".join(dict.fromkeys(date[session] for session in sessions))
+        found = f"found another speed of joint {joint} on {dates}"
+        lines.append(f"history, {movement}: {found}, allowed that of this session up to {100 * SAME_SPEED:.0f} %: not compared")
+    return lines
 
 
 def _not_last(date: str, later: Sequence[str]) -> tuple[str, ...]:

@@ -127,8 +127,8 @@ class PassiveMoments(Tabular):
     def followed(self) -> tuple[Estimate, ...]:
         """Return what a history keeps, with intervals from the scatter of the repeats and from markers, which every session places anew.
 
-        For each joint in each slow movement the mean half width of the hysteresis [N m], the stiffness [N m/rad] and the range that was
-        moved through [rad]; for each pair of joints their coupling [N m/rad].
+        For each joint in each slow movement the mean half width of the hysteresis [N m], the stiffness [N m/rad], the range that was moved
+        through [rad] and the speed [rad/s]; for each pair of joints their coupling [N m/rad].
         """
         found = []
         for curve in (c for c in self.curves if c.slow):
@@ -142,6 +142,7 @@ class PassiveMoments(Tabular):
                 "half_width": (curve.means("half_width"), "N m"),
                 "stiffness": (curve.stiffness(), "N m/rad"),
                 "range": (np.array([np.ptp(angles) for angles in own if angles.size]), "rad"),
+                "speed": (self._speeds(curve), "rad/s"),
             }
             found += [
                 _estimate(f"{name} in {curve.configuration}", curve.joint, interval_of(values, placed.get(name, 0.0)), unit)
@@ -149,6 +150,12 @@ class PassiveMoments(Tabular):
             ]
         found += [_estimate(f"coupling {c.joints[0]}-{c.joints[1]}", None, c.interval, "N m/rad") for c in self.couplings]
         return tuple(found)
+
+    def _speeds(self, curve: PassiveCurve) -> np.ndarray:
+        """Return the usual speed of the joint of a curve in every repeat [rad/s]."""
+        j = curve.joint - 1
+        moving = [np.abs(m.qd[m.direction[:, j] != 0, j]) for m in self.trials if m.trial.configuration == curve.configuration]
+        return np.array([np.median(speeds) for speeds in moving if speeds.size])
 
     def tidy(self) -> Tidy:
         """Return the curves, one angle a row."""

@@ -288,8 +288,8 @@ def _stretch(
     moved = [_moment(joint_centres.lengthened(model, a), t, motion + e, force)[:, joint] for e, a in zip(turned, longer, strict=True)]
     placed, misread = np.array([smooth(seen - still) for seen in moved]).reshape(-1, len(t)), turned[:, :, joint]
     coarser = low_pass(rate / every, 0.5 * fine)
-    edge = min(round(EDGE * rate / (every * cutoff)), (len(t) - 3) // 2)
-    return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, smooth, coarser, shared, placed, misread, edge)
+    edge, active = min(round(EDGE * rate / (every * cutoff)), (len(t) - 3) // 2), moments.trial.active[there][::every]
+    return Stretch(t, q, qd, qdd, moment, fine_q, fine_qd, smooth, coarser, shared, placed, misread, active, edge=edge)
 
 
 def _moment(model: Model, t: np.ndarray, q: np.ndarray, force: np.ndarray | None) -> np.ndarray:
