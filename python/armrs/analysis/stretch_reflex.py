@@ -67,7 +67,7 @@ class Stretch:
         What the latter do to the angle [rad], and so to the input speed of the reflex.
     active : ndarray of bool, shape (n,)
         Where muscles are active.
-    voluntary : ndarray of bool, shape (n,)
+    contracted : ndarray of bool, shape (n,)
         Where they are, and no reflex drives them: the moment is free there.
     edge : int
         Samples at each end that are not fitted: a low-pass has one side of them only. A reflex still depends on their motion.
@@ -86,7 +86,7 @@ class Stretch:
     placed: np.ndarray = field(repr=False)
     misread: np.ndarray = field(repr=False)
     active: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool), repr=False)
-    voluntary: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool), repr=False)
+    contracted: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=bool), repr=False)
     edge: int = 0
 
     @cached_property
@@ -104,12 +104,12 @@ class Stretch:
 
     @cached_property
     def unknown(self) -> np.ndarray:
-        """An orthonormal basis of the unknowns of a trial, (n_fitted, k): its offset, what dry friction holds at rest, voluntary torque.
+        """An orthonormal basis of the unknowns of a trial, (n_fitted, k): offset, what friction holds at rest, what contractions exert.
 
         These change as the joint creeps and the muscle twitches: they have a level of their own every `HELD`.
         """
         held = []
-        for rest in (*self.rests, *self._runs(self.voluntary)):
+        for rest in (*self.rests, *self._runs(self.contracted)):
             part = ((self.t[rest] - self.t[rest.start]) / HELD).astype(int)
             for k in np.unique(part):
                 column = np.zeros(len(self.t))
@@ -127,12 +127,12 @@ class Stretch:
         inner = self.inner(values)
         return np.asarray(inner - self.unknown @ (self.unknown.T @ inner))
 
-    def without_voluntary(self, direction: int, threshold: float) -> Stretch:
+    def without_contractions(self, direction: int, threshold: float) -> Stretch:
         """Return the stretch with the moment free where muscles are active and no reflex with this threshold [rad/s] acts or has acted."""
         past = round(AFTER / (self.t[1] - self.t[0]))
         speed = np.concatenate([np.zeros(past), direction * self.fine_qd])
         fastest = np.lib.stride_tricks.sliding_window_view(speed, past + 1).max(axis=1)
-        return replace(self, voluntary=self.active & (fastest < BELOW * threshold))
+        return replace(self, contracted=self.active & (fastest < BELOW * threshold))
 
     def moved_by(self, error: np.ndarray) -> Stretch:
         """Return the stretch with an error of the angle, (n,) [rad]."""
@@ -211,8 +211,8 @@ def fit(stretches: Sequence[Stretch]) -> Reflex | None:
     found = _fitted(stretches)
     if not found.found or not any(s.active.any() for s in stretches):
         return found
-    passive = [s.without_voluntary(found.direction, found.parameters["threshold"].value) for s in stretches]
-    return _fitted(passive) if any(s.voluntary.any() for s in passive) else found
+    passive = [s.without_contractions(found.direction, found.parameters["threshold"].value) for s in stretches]
+    return _fitted(passive) if any(s.contracted.any() for s in passive) else found
 
 
 def _fitted(stretches: Sequence[Stretch]) -> Reflex:

@@ -146,11 +146,7 @@ def import_recordings(
         raise BadInput("sources", Text("nothing"), "one recording or more")
     former = _former(files.output_folder(out), checks.flag("replace", replace))
     tell = checks.progress(progress)
-    if isinstance(model, Model):
-        loaded, about = model, _NOBODY
-    else:
-        file = model_file(paths, model)
-        loaded, about = load_model(file), _about_of(file)
+    loaded, about = (model, _NOBODY) if isinstance(model, Model) else _model_of(model_file(paths, model))
     if _is_recipe(paths):
         recipe = load_recipe(paths[0])
         reads = _reread(recipe, paths[0].parent)
@@ -163,10 +159,18 @@ def import_recordings(
     loaded, said = _led(loaded, recipe, reads)
     tell("writing", _DECIDED)
     folder = files.output_folder(out)
-    # Springs and constant moments may balance forces in another unit where the movements are small: the weight then shows it.
-    weight = other_weight(_write(folder, former, loaded, recipe, reads, about))
-    doubts += [str(weight)] if weight is not None and weight.units else []
+    doubts += _other_unit(_write(folder, former, loaded, recipe, reads, about))
     return Imported(folder, recipe, (*notes, *said), tuple(doubts))
+
+
+def _other_unit(dataset: Dataset) -> list[str]:
+    """Return that the weight of the arm shows another unit of the forces: in small movements springs and constant moments balance any."""
+    weight = other_weight(dataset)
+    return [str(weight)] if weight is not None and weight.units else []
+
+
+def _model_of(file: Path) -> tuple[Model, _About]:
+    return load_model(file), _about_of(file)
 
 
 def _is_recipe(paths: Sequence[Path]) -> bool:
