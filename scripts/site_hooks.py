@@ -25,6 +25,9 @@ ELSEWHERE = {
 """Pages of the site by the files that they are made of, from the root of the repository."""
 UNSOUGHT = {*ELSEWHERE, "architecture.md", "developer.md", "dossier.md", "performance.md"}
 """Pages that the search leaves out: a reader's browser loads its index with the first page, and these are not what is looked for."""
+WHOLE = 2000
+"""Characters of a section whose paragraphs the search shows as they are; of what follows in a long section it has each word once."""
+_WORD = re.compile(r"[^\W\d][\w.-]*\w")
 _PROSE = re.compile(r"(<(?:p|ul|ol)\b.*?</(?:p|ul|ol)>)", flags=re.S)
 _NAMED_BLOCK = re.compile(r"^```(\w+) ([^\n\"=]+)$", flags=re.M)
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', flags=re.S)
@@ -88,14 +91,23 @@ def on_post_build(config: MkDocsConfig) -> None:
 
 
 def _searched(text: str, *, summary: bool) -> str:
-    """Return what is searched of a section: its paragraphs, and each word of its tables and code once; of the Python API one paragraph."""
-    kept = []
+    """Return what is searched of a section: its first paragraphs, and each word of the others, of its tables and its code once.
+
+    Of the Python API it is one paragraph.
+    """
+    kept, rest, length = [], [], 0
     for k, block in enumerate(_PROSE.split(text)):
         plain, prose = re.sub("<[^>]+>", " ", block), k % 2 == 1
-        words = plain.split() if prose else list(dict.fromkeys(re.findall(r"[^\W\d][\w.-]*\w", html.unescape(plain))))
-        if words and (prose or not summary):
-            kept.append(f"<p>{' '.join(words)}</p>")
-    return "".join(kept[:1] if summary else kept)
+        if prose and plain.strip() and length <= WHOLE:
+            kept.append(f"<p>{' '.join(plain.split())}</p>")
+            length += len(plain)
+        else:
+            rest += _WORD.findall(html.unescape(plain))
+    if summary:
+        return "".join(kept[:1])
+    shown = set(_WORD.findall(html.unescape(" ".join(kept))))
+    words = [word for word in dict.fromkeys(rest) if word not in shown]
+    return "".join(kept) + (f"<p>{' '.join(words)}</p>" if words else "")
 
 
 def _named_dialog(output: str) -> str:

@@ -162,8 +162,8 @@ def test_every_effect_and_command_that_documents_name_exists() -> None:
 
 
 def test_every_link_leads_somewhere() -> None:
-    for page in (ROOT / "README.md", *DOCS.glob("*.md")):
-        for target in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+    for page in (*(ROOT / f"{name}.md" for name in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")), *DOCS.glob("*.md")):
+        for target in re.findall(r"\]\((?!https:)([^)]+)\)", page.read_text(encoding="utf-8")):
             file, _, place = target.partition("#")
             linked = page.parent / file if file else page
             assert linked.exists(), f"{page.name}: {target}"

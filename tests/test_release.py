@@ -14,13 +14,21 @@ tomllib = pytest.importorskip("tomllib")
 ROOT = Path(__file__).parents[1]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "release_notes.py"))
 OTHER_NAMES = {"matplotlib-base": "matplotlib"}
+PLACES = {
+    "conda/recipe.yaml": r"^  version: (\S+)$",
+    "crates/arm-capi/CMakeLists.txt": r"^project\(armrs VERSION (\S+)",
+    "crates/arm-capi/include/armrs.h": r'^#define ARMRS_VERSION "([^"]+)"',
+    "docs/sbom/package.cdx.json": r'"ref": "pkg:generic/armrs@([^"]+)"',
+    "docs/sbom/device.cdx.json": r'"ref": "pkg:generic/armrs-c@([^"]+)"',
+}
 
 
 def test_one_version_stands_everywhere() -> None:
-    recipe = re.search(r"^  version: (\S+)$", (ROOT / "conda/recipe.yaml").read_text(encoding="utf-8"), flags=re.M)
     crates = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["dependencies"]
     ours = {crate["version"] for name, crate in crates.items() if name.startswith("arm-")}
-    assert recipe and {armrs.__version__} == {recipe[1], *SCRIPT["stated"]().values()} | ours
+    found = {name: re.findall(pattern, (ROOT / name).read_text(encoding="utf-8"), flags=re.M) for name, pattern in PLACES.items()}
+    assert found == {name: [armrs.__version__] for name in PLACES}
+    assert {armrs.__version__} == {*SCRIPT["stated"]().values()} | ours
 
 
 def test_the_version_has_notes_in_the_changelog() -> None:

@@ -12,7 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define ARMRS_VERSION "0.1.0"
+#define ARMRS_VERSION "0.2.0"
 
 // Where a result that is not looked at is told.
 #if defined(__GNUC__)
