@@ -31,7 +31,8 @@ impl<T: Scalar, const N: usize> Load<T, N> {
 }
 
 /// Joint torques `Jᵀ F` of a force and a moment on the arm at its tip \[N m\].
-#[inline]
+#[cfg_attr(target_os = "none", inline)]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub fn static_torque<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -45,7 +46,7 @@ pub fn static_torque<T: Scalar, const N: usize>(
     to_joint_torque(&rows)
 }
 
-#[inline]
+#[inline(always)]
 fn link_force<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -57,6 +58,8 @@ fn link_force<T: Scalar, const N: usize>(
 /// Joint torques that move the arm with `qd`, `qdd`: `B q̈ + C q̇ + G` \[N m\].
 ///
 /// Equals [`regressor`](crate::regressor) times the base parameters.
+// Always, so that a loop which is compiled for wider vectors takes it along.
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub fn inverse_dynamics<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
