@@ -58,9 +58,19 @@ fn link_force<T: Scalar, const N: usize>(
 /// Joint torques that move the arm with `qd`, `qdd`: `B q̈ + C q̇ + G` \[N m\].
 ///
 /// Equals [`regressor`](crate::regressor) times the base parameters.
-// Always, so that a loop which is compiled for wider vectors takes it along.
-#[cfg_attr(not(target_os = "none"), inline(always))]
 pub fn inverse_dynamics<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    qd: &Joints<T, N>,
+    qdd: &Joints<T, N>,
+) -> Joints<T, N> {
+    inverse_dynamics_inlined(chain, pose, qd, qdd)
+}
+
+/// [`inverse_dynamics`] for loops over lanes that are compiled for wider vectors: only what is inlined goes along. A loop over single
+/// states takes a tenth more instructions with it.
+#[inline(always)]
+pub fn inverse_dynamics_inlined<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
     qd: &Joints<T, N>,
