@@ -15,7 +15,7 @@ import problem
 from programs import Missing, Peer
 from workloads import Measured
 
-NATIVE = ("armrs, Rust", "limit", "MuJoCo, C", "Pinocchio, C++")
+NATIVE = ("armrs, Rust", "limit", "limit, nothing fused", "MuJoCo, C", "Pinocchio, C++")
 WORKLOADS = ("W1", "W2", "W2a", "W3", "W3a", "W4")
 
 

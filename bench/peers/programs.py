@@ -69,6 +69,10 @@ def _limit(work: Path) -> list[str]:
     return _compile(work, "limit.cpp", "limit", "c++", ["-march=native", "-std=gnu++17"])
 
 
+def _unfused(work: Path) -> list[str]:
+    return _compile(work, "limit.cpp", "unfused", "c++", ["-march=native", "-ffp-contract=off", "-std=gnu++17"])
+
+
 def _mujoco_c(work: Path) -> list[str]:
     package = _package("mujoco")
     library = next(iter(sorted(package.glob("libmujoco*"))), None)
@@ -113,6 +117,7 @@ def start(work: Path, rust: Path) -> tuple[dict[str, Peer], dict[str, str]]:
         "armrs, Rust": own,
         "armrs, Python": lambda w: _python(w, "armrs_python.py", "armrs"),
         "limit": _limit,
+        "limit, nothing fused": _unfused,
         "MuJoCo, C": _mujoco_c,
         "MuJoCo, Python": lambda w: _python(w, "mujoco_python.py", "mujoco"),
         "Pinocchio, C++": _pinocchio_c,

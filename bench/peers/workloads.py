@@ -31,7 +31,17 @@ class Measured:
 
 
 def _kernels() -> list[Measured]:
-    callers = ("armrs, Rust", "limit", "Pinocchio, C++", "MuJoCo, C", "armrs, Python", "Pinocchio, Python", "MuJoCo, Python", "numba")
+    callers = (
+        "armrs, Rust",
+        "limit",
+        "limit, nothing fused",
+        "Pinocchio, C++",
+        "MuJoCo, C",
+        "armrs, Python",
+        "Pinocchio, Python",
+        "MuJoCo, Python",
+        "numba",
+    )
     once = [Measured("W1", tool, kernel) for kernel in ("inverse_dynamics", "forward_dynamics") for tool in callers]
     clock = [
         Measured("W1", "MuJoCo, Python", f"{kernel}:clock", "profiling clock on") for kernel in ("inverse_dynamics", "forward_dynamics")
@@ -53,6 +63,8 @@ def _runs() -> list[Measured]:
     rows = [
         ("limit", "run", "one loop, the handle's path computed in every step"),
         ("limit", "run:table", "one loop, the path from a table"),
+        ("limit, nothing fused", "run", "one loop, the handle's path computed in every step"),
+        ("limit, nothing fused", "run:table", "one loop, the path from a table"),
         ("armrs, Rust", "run", "recorded at 50 Hz"),
         ("armrs, Rust", "run:ends", "first and last sample only"),
         ("armrs, Rust", "run:fourth", "fourth order, recorded at 50 Hz"),
@@ -71,6 +83,7 @@ def _batches() -> list[Measured]:
         ("limit", "batch:scalar", "one run after another"),
         ("limit", "batch:avx2", "four runs in a register"),
         ("limit", "batch:avx512", "eight runs in a register or two"),
+        ("limit, nothing fused", "batch:avx2", "four runs in a register"),
         ("armrs, Rust", "batch", "simulate_batch, one thread"),
         ("armrs, Rust", "batch:wall:1", "simulate_batch, one thread, wall clock"),
         ("armrs, Rust", "batch:wall:2", "simulate_batch, two threads, wall clock"),

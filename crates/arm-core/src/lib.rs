@@ -46,7 +46,8 @@ pub use dynamics::energy::{kinetic_energy, potential_energy};
 pub use dynamics::gravity::gravity;
 pub use dynamics::inertia::{inertia, link_inertia};
 pub use dynamics::inverse_and_forward::{
-    Load, Resistance, accelerations, forward_dynamics, inverse_dynamics, joint_force, static_torque,
+    Load, Resistance, accelerations, forward_dynamics, inverse_dynamics, inverse_dynamics_inlined,
+    joint_force, static_torque,
 };
 pub use dynamics::kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};
 pub use dynamics::products::Products;

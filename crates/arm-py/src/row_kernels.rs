@@ -70,7 +70,7 @@ kernels! {
         put(&arm_core::static_torque(chain, &pose, [force[0], force[1]], T::ZERO), out);
     };
     InverseDynamics, in lanes true: |n| [n], |chain, [q, qd, qdd], out| {
-        put(&arm_core::inverse_dynamics(chain, &Pose::new(&joints(q)), &joints(qd), &joints(qdd)), out);
+        put(&arm_core::inverse_dynamics_inlined(chain, &Pose::new(&joints(q)), &joints(qd), &joints(qdd)), out);
     };
     ForwardDynamics, in lanes true: |n| [n], |chain, [q, qd, torque], out| {
         let load = Load { torque: joints(torque), ..Load::none() };

@@ -1,10 +1,9 @@
 //! The torques of the equation of motion, each by itself.
 
+use crate::dynamics::coriolis::centrifugal_of;
+use crate::dynamics::inertia::{pairs, turning};
 use crate::dynamics::kinematics::{to_joint_torque, to_links};
-use crate::{
-    Chain, Joints, Load, Pose, Scalar, centrifugal, coriolis, gravity, joints, link_inertia,
-    static_torque,
-};
+use crate::{Chain, Joints, Load, Pose, Products, Scalar, gravity, joints, static_torque};
 
 /// The terms of `B q̈ + C q̇ + G = τ + Jᵀ F`, each shoulder first \[N m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +36,7 @@ impl<T: Scalar, const N: usize> Contributions<T, N> {
 }
 
 /// The torques of a motion under a load.
+#[inline(always)]
 pub fn contributions<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -45,16 +45,17 @@ pub fn contributions<T: Scalar, const N: usize>(
 ) -> Contributions<T, N> {
     let (qd, qdd) = motion;
     let acceleration = to_links(qdd);
-    let m = link_inertia(chain, pose);
+    let (m, slopes) = pairs(&Products::of(chain), pose);
     let inertial: [T; N] = core::array::from_fn(|i| {
         let mut sum = T::ZERO;
         for k in 0..N {
-            sum += m[(i, k)] * acceleration[k];
+            let entry = if i < k { m[k][i] } else { m[i][k] };
+            sum += entry * acceleration[k];
         }
         sum
     });
-    let centrifugal = centrifugal(chain, pose, qd);
-    let mut products = coriolis(chain, pose, qd);
+    let centrifugal = centrifugal_of(&slopes, qd);
+    let mut products = to_joint_torque(&turning(&slopes, &to_links(qd)));
     for i in 0..N {
         products[i] -= centrifugal[i];
     }

@@ -1,6 +1,6 @@
 //! Coriolis and centrifugal torques.
 
-use crate::dynamics::inertia::{link_motion, to_joint_matrix};
+use crate::dynamics::inertia::{link_motion, pairs, to_joint_matrix, turning};
 use crate::dynamics::kinematics::{to_joint_torque, to_links};
 use crate::{Chain, JointMatrix, Joints, Pose, Products, Scalar, joints};
 
@@ -54,11 +54,20 @@ pub fn centrifugal<T: Scalar, const N: usize>(
     pose: &Pose<T, N>,
     qd: &Joints<T, N>,
 ) -> Joints<T, N> {
+    centrifugal_of(&pairs(&Products::of(chain), pose).1, qd)
+}
+
+/// [`centrifugal`] from the slopes of [`pairs`].
+#[inline(always)]
+pub(crate) fn centrifugal_of<T: Scalar, const N: usize>(
+    slopes: &[[T; N]; N],
+    qd: &Joints<T, N>,
+) -> Joints<T, N> {
     let mut total = joints([T::ZERO; N]);
     for k in 0..N {
         let mut alone = joints([T::ZERO; N]);
         alone[k] = qd[k];
-        let torque = coriolis(chain, pose, &alone);
+        let torque = to_joint_torque(&turning(slopes, &to_links(&alone)));
         for i in 0..N {
             total[i] += torque[i];
         }

@@ -4,6 +4,7 @@ use crate::dynamics::kinematics::to_links;
 use crate::{Chain, Joints, Pose, Scalar, link_inertia};
 
 /// Kinetic energy `½ q̇ᵀ B q̇` \[J\].
+#[inline(always)]
 pub fn kinetic_energy<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -21,6 +22,7 @@ pub fn kinetic_energy<T: Scalar, const N: usize>(
 }
 
 /// Potential energy of the weight relative to the base \[J\]; its gradient to `q` is [`gravity`](crate::gravity).
+#[inline(always)]
 pub fn potential_energy<T: Scalar, const N: usize>(chain: &Chain<T, N>, pose: &Pose<T, N>) -> T {
     let [gy, gz] = chain.gravity;
     let mut energy = T::ZERO;

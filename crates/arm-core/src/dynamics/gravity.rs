@@ -26,6 +26,7 @@ pub(crate) fn weight_moments<T: Scalar, const N: usize>(chain: &Chain<T, N>, i: 
 }
 
 /// Gravity torques `G(q)` on the left-hand side of the equation of motion, shoulder first \[N m\] (thesis 3.8).
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub fn gravity<T: Scalar, const N: usize>(chain: &Chain<T, N>, pose: &Pose<T, N>) -> Joints<T, N> {
     to_joint_torque(&link_gravity(chain, pose))
 }

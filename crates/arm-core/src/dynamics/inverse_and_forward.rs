@@ -31,7 +31,8 @@ impl<T: Scalar, const N: usize> Load<T, N> {
 }
 
 /// Joint torques `Jᵀ F` of a force and a moment on the arm at its tip \[N m\].
-#[inline]
+#[cfg_attr(target_os = "none", inline)]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub fn static_torque<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -45,7 +46,7 @@ pub fn static_torque<T: Scalar, const N: usize>(
     to_joint_torque(&rows)
 }
 
-#[inline]
+#[inline(always)]
 fn link_force<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
@@ -58,6 +59,18 @@ fn link_force<T: Scalar, const N: usize>(
 ///
 /// Equals [`regressor`](crate::regressor) times the base parameters.
 pub fn inverse_dynamics<T: Scalar, const N: usize>(
+    chain: &Chain<T, N>,
+    pose: &Pose<T, N>,
+    qd: &Joints<T, N>,
+    qdd: &Joints<T, N>,
+) -> Joints<T, N> {
+    inverse_dynamics_inlined(chain, pose, qd, qdd)
+}
+
+/// [`inverse_dynamics`] for loops over lanes that are compiled for wider vectors: only what is inlined goes along. A loop over single
+/// states takes a tenth more instructions with it.
+#[inline(always)]
+pub fn inverse_dynamics_inlined<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     pose: &Pose<T, N>,
     qd: &Joints<T, N>,

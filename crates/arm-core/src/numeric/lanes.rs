@@ -1,6 +1,5 @@
 //! Several numbers in SIMD lanes, one simulation in each.
 
-use core::array::from_fn;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use crate::numeric::scalar::Scalar;
@@ -12,9 +11,19 @@ use crate::numeric::transcendental::{exp, tanh};
 pub struct Lanes<const L: usize>(pub [f64; L]);
 
 impl<const L: usize> Lanes<L> {
+    /// A value for each lane. Not by `from_fn` or `map` of arrays, which may become calls: their code would not be of the widest vectors.
+    #[inline(always)]
+    fn each(value: impl Fn(usize) -> f64) -> Self {
+        let mut lanes = [0.0; L];
+        for (i, lane) in lanes.iter_mut().enumerate() {
+            *lane = value(i);
+        }
+        Self(lanes)
+    }
+
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(from_fn(|i| f(self.0[i], other.0[i])))
+        Self::each(|i| f(self.0[i], other.0[i]))
     }
 }
 
@@ -35,7 +44,7 @@ impl<const L: usize> Neg for Lanes<L> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|a| -a))
+        Self::each(|i| -self.0[i])
     }
 }
 
@@ -62,17 +71,17 @@ impl<const L: usize> Scalar for Lanes<L> {
     }
     #[inline(always)]
     fn if_less(a: Self, b: Self, then: Self, otherwise: Self) -> Self {
-        Self(from_fn(|i| {
+        Self::each(|i| {
             if a.0[i] < b.0[i] {
                 then.0[i]
             } else {
                 otherwise.0[i]
             }
-        }))
+        })
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(self.0.map(f64::abs))
+        Self::each(|i| f64::abs(self.0[i]))
     }
     #[inline(always)]
     fn every(self, condition: impl Fn(f64) -> bool) -> bool {
@@ -85,11 +94,11 @@ impl<const L: usize> Scalar for Lanes<L> {
     }
     #[inline(always)]
     fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        Self(self.0.map(f))
+        Self::each(|i| f(self.0[i]))
     }
     #[inline(always)]
     fn together<const K: usize>(values: [Self; K], f: impl Fn([f64; K]) -> f64) -> Self {
-        Self(from_fn(|i| f(values.map(|v| v.0[i]))))
+        Self::each(|i| f(core::array::from_fn(|k| values[k].0[i])))
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

@@ -60,8 +60,12 @@ pub trait Scalar:
     /// [`Scalar::sin_cos`] of several angles \[rad\]: all sines, all cosines.
     #[inline(always)]
     fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
-        let both = angles.map(Self::sin_cos);
-        [both.map(|(sin, _)| sin), both.map(|(_, cos)| cos)]
+        // Not by `map`, which may become a call: its code would not be of the widest vectors.
+        let [mut sines, mut cosines] = [[Self::ZERO; K]; 2];
+        for i in 0..K {
+            (sines[i], cosines[i]) = angles[i].sin_cos();
+        }
+        [sines, cosines]
     }
     /// Exponential; within 1 unit in the last place of `libm`, zero below −708.
     fn exp(self) -> Self;

@@ -5,7 +5,7 @@ use arm_core::effect::{
 };
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
-    Setup, forward_dynamics, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
+    Setup, accelerations, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
 };
 
 use crate::closed_chain::branch_free::{BranchFree, affine, contact_gap, load, pull};
@@ -190,6 +190,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     }
 
     /// Kinetic and potential energy, and the energy in the springs of the contact \[J\].
+    #[inline(always)]
     pub fn energy(
         &self,
         pose: &Pose<T, N>,
@@ -342,11 +343,9 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 Some(terms) => (qdd, *force) = self.accelerations(input, &torque, *force, terms),
                 None => {
                     let load = self.load(pose, &torque, *force);
-                    let (products, resistance) = arm.get_or_insert_with(|| {
-                        let products = Products::of(&self.chain);
-                        (products, Resistance::at(&products, pose, &qd))
-                    });
-                    qdd = resistance.accelerations(products, pose, &load);
+                    let resistance =
+                        arm.get_or_insert_with(|| Resistance::at(&self.products, pose, &qd));
+                    qdd = resistance.accelerations(&self.products, pose, &load);
                 }
             }
         }
@@ -362,12 +361,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         torque: &Joints<T, N>,
         force_on_arm: Plane<T>,
     ) -> Joints<T, N> {
-        forward_dynamics(
-            &self.chain,
-            pose,
-            qd,
-            &self.load(pose, torque, force_on_arm),
-        )
+        let load = self.load(pose, torque, force_on_arm);
+        accelerations(&self.products, pose, qd, &load)
     }
 
     /// What the joints and the handle load the arm with.

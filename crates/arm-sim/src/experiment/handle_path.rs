@@ -1,7 +1,5 @@
 //! The path of the robot's handle over time.
 
-use core::array::from_fn;
-
 use arm_core::{Chain, Plane, Robot, Scalar};
 
 use crate::error::finite;
@@ -17,6 +15,31 @@ pub struct Handle<T> {
     pub velocity: Plane<T>,
     /// Acceleration \[m/s²\].
     pub acceleration: Plane<T>,
+}
+
+/// Motions of the handle at some times, each quantity by itself: written as vectors and read as numbers. Read in the other order, a
+/// vector has to wait until all of its numbers have reached memory.
+pub(crate) struct Handles<const P: usize>([[f64; P]; 6]);
+
+impl<const P: usize> Handles<P> {
+    /// The motion at one of the times.
+    #[inline(always)]
+    pub fn at(&self, time: usize) -> Handle<f64> {
+        let plane = |axes: usize| [self.0[axes][time], self.0[axes + 1][time]];
+        Handle {
+            position: plane(0),
+            velocity: plane(2),
+            acceleration: plane(4),
+        }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, time: usize, handle: &Handle<f64>) {
+        let motion = [handle.position, handle.velocity, handle.acceleration];
+        for (quantity, value) in self.0.iter_mut().zip(motion.as_flattened()) {
+            quantity[time] = *value;
+        }
+    }
 }
 
 /// The commanded path of the robot's handle as a function of time.
@@ -118,10 +141,7 @@ impl<const N: usize> HandlePath<N> {
                     acceleration: jet.curvature,
                 }
             }
-            Source::Arm(..) => {
-                let [handle] = self.abreast(&[time]);
-                handle
-            }
+            Source::Arm(..) => self.abreast(&[time]).at(0),
             Source::Robot(robot, series) => {
                 let JointMotion { q, qd, qdd } = joints(series.at(time));
                 Handle {
@@ -135,14 +155,17 @@ impl<const N: usize> HandlePath<N> {
 
     /// [`HandlePath::at`] for several increasing times at once; the same bits.
     #[inline(always)]
-    pub(crate) fn abreast<const P: usize>(&self, times: &[f64; P]) -> [Handle<f64>; P] {
-        match &self.source {
-            Source::Arm(arm, movement) => match movement.way(times) {
-                Some(way) => tip_motion(arm, &way),
-                None => times.map(|time| self.at(time)),
-            },
-            _ => times.map(|time| self.at(time)),
+    pub(crate) fn abreast<const P: usize>(&self, times: &[f64; P]) -> Handles<P> {
+        if let Source::Arm(arm, movement) = &self.source
+            && let Some(way) = movement.way(times)
+        {
+            return tip_motion(arm, &way);
         }
+        let mut handles = Handles([[0.0; P]; 6]);
+        for (t, &time) in times.iter().enumerate() {
+            handles.set(t, &self.at(time));
+        }
+        handles
     }
 
     /// Joint motion of the robot at a time: what it was given, or by inverse kinematics of `robot`.
@@ -188,7 +211,7 @@ fn joints(jet: Jet<2>) -> JointMotion<2> {
 fn tip_motion<const P: usize, const N: usize>(
     arm: &Chain<f64, N>,
     way: &Way<'_, P, N>,
-) -> [Handle<f64>; P] {
+) -> Handles<P> {
     let [mut angle, mut speed, mut acceleration] = [[0.0; P]; 3];
     let mut sums = [[0.0; P]; 6];
     let [y0, z0] = arm.base();
@@ -212,9 +235,5 @@ fn tip_motion<const P: usize, const N: usize>(
             sums[5][t] += acceleration[t] * y - inward * z;
         }
     }
-    from_fn(|t| Handle {
-        position: [sums[0][t], sums[1][t]],
-        velocity: [sums[2][t], sums[3][t]],
-        acceleration: [sums[4][t], sums[5][t]],
-    })
+    Handles(sums)
 }

@@ -152,26 +152,27 @@ impl Slopes {
     /// factors are real. Across a constraint it is made so by a large multiple (Debreu 1952).
     fn definite(&self, damping: f64) -> bool {
         let n = self.free.len();
-        let mut a = vec![vec![0.0; n]; n];
+        // By rows, in one piece: this is called often, and reserving memory takes longer than the rest.
+        let mut a = vec![0.0; n * n];
         for (i, &p) in self.free.iter().enumerate() {
             for (k, &q) in self.free.iter().enumerate() {
-                a[i][k] = 0.5 * (self.rows[p][q] + self.rows[q][p]);
+                a[n * i + k] = 0.5 * (self.rows[p][q] + self.rows[q][p]);
                 for constraint in &self.rows[self.joints..] {
                     let square: f64 = constraint[..self.joints].iter().map(|g| g * g).sum();
-                    a[i][k] += self.scale / ROUNDING * constraint[p] * constraint[q] / square;
+                    a[n * i + k] += self.scale / ROUNDING * constraint[p] * constraint[q] / square;
                 }
             }
-            a[i][i] += damping;
+            a[n * i + i] += damping;
         }
         for k in 0..n {
             // NaN is not positive.
-            if a[k][k].partial_cmp(&0.0) != Some(core::cmp::Ordering::Greater) {
+            if a[n * k + k].partial_cmp(&0.0) != Some(core::cmp::Ordering::Greater) {
                 return false;
             }
             for i in k + 1..n {
-                let factor = a[i][k] / a[k][k];
+                let factor = a[n * i + k] / a[n * k + k];
                 for j in k + 1..n {
-                    a[i][j] -= factor * a[k][j];
+                    a[n * i + j] -= factor * a[n * k + j];
                 }
             }
         }
@@ -181,31 +182,34 @@ impl Slopes {
     /// Solution of `(∂r/∂x + damping of the joints) s = r` by Gaussian elimination; nothing where it is singular.
     fn solve(&self, damping: f64, r: &[f64]) -> Option<Vec<f64>> {
         let n = r.len();
-        let mut rows: Vec<Vec<f64>> = self
-            .rows
-            .iter()
-            .zip(r)
-            .map(|(row, r)| [row.as_slice(), &[*r]].concat())
-            .collect();
-        for (i, row) in rows.iter_mut().enumerate().take(self.joints) {
-            row[i] += damping;
+        let width = n + 1;
+        let mut rows: Vec<f64> = Vec::with_capacity(n * width);
+        for (row, r) in self.rows.iter().zip(r) {
+            rows.extend(row.iter().chain([r]));
+        }
+        for i in 0..self.joints {
+            rows[width * i + i] += damping;
         }
         for k in 0..n {
-            let largest = |a: &usize, b: &usize| rows[*a][k].abs().total_cmp(&rows[*b][k].abs());
-            let pivot = (k..n).max_by(largest)?;
-            rows.swap(k, pivot);
-            let head = rows[k].clone();
-            for row in rows.iter_mut().skip(k + 1) {
+            let size = |row: usize| f64::abs(rows[width * row + k]);
+            let pivot = (k..n).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+            for c in 0..width {
+                rows.swap(width * k + c, width * pivot + c);
+            }
+            let (above, below) = rows.split_at_mut(width * (k + 1));
+            let head = &above[width * k..];
+            for row in below.chunks_exact_mut(width) {
                 let factor = row[k] / head[k];
-                for (value, above) in row.iter_mut().zip(&head).skip(k) {
+                for (value, above) in row.iter_mut().zip(head).skip(k) {
                     *value -= factor * above;
                 }
             }
         }
         let mut step = vec![0.0; n];
         for k in (0..n).rev() {
-            let known: f64 = (k + 1..n).map(|c| rows[k][c] * step[c]).sum();
-            step[k] = (rows[k][n] - known) / rows[k][k];
+            let row = &rows[width * k..];
+            let known: f64 = (k + 1..n).map(|c| row[c] * step[c]).sum();
+            step[k] = (row[n] - known) / row[k];
         }
         step.iter().all(|s| s.is_finite()).then_some(step)
     }

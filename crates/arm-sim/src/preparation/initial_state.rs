@@ -1,6 +1,6 @@
 //! The initial state of a run.
 
-use arm_core::effect::{MAX_STATES, dry_friction};
+use arm_core::effect::dry_friction;
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
@@ -187,8 +187,7 @@ fn most_friction<const N: usize>(
     let force = force(model, input, x);
     let through = model.through_joints(&Pose::new(&q), (&rest, &rest), (force, input));
     let motion = input.motion(&q, &rest).with_joint_force(&through);
-    let memory = vec![[0.0; MAX_STATES]; model.effects.len()];
-    dry_friction(&model.effects, &motion, &memory)
+    dry_friction(&model.effects, &motion, &[])
 }
 
 /// The equilibrium of the joints that friction does not hold where they are given.
@@ -325,8 +324,7 @@ fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[
     let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
     let rest = Joints::<f64, N>::zeros();
     let pose = Pose::new(&q);
-    let memory = vec![[0.0; MAX_STATES]; model.effects.len()];
-    let resisting = model.resisting(&input.motion(&q, &rest), &memory);
+    let resisting = model.resisting(&input.motion(&q, &rest), &[]);
     let force = force(model, input, x);
     let terms = model.terms(&pose, &rest);
     let held = terms.tip_torque(force);

@@ -1,6 +1,5 @@
 //! A prepared run: checked experiment, effects applied, schedule, robot angles.
 
-use std::array::from_fn;
 use std::ops::Range;
 
 use arm_core::effect::{Effect, Place};
@@ -226,12 +225,15 @@ impl<const N: usize> Computation for Abreast<'_, N> {
         for halves in self.half_steps.chunks(ABREAST) {
             // A last group that is not full repeats its end.
             let half = |i: usize| halves[i.min(halves.len() - 1)];
-            let times: [f64; ABREAST] = from_fn(|i| self.schedule.half_time(half(i)));
+            // Not by `from_fn`, which may become a call.
+            let mut times = [0.0; ABREAST];
+            for (i, time) in times.iter_mut().enumerate() {
+                *time = self.schedule.half_time(half(i));
+            }
             let handles = self.path.abreast(&times);
-            let inputs = times.iter().zip(handles).take(halves.len());
-            self.out.extend(inputs.map(|(&time, handle)| Input {
-                time,
-                handle,
+            self.out.extend((0..halves.len()).map(|i| Input {
+                time: times[i],
+                handle: handles.at(i),
                 torque: Joints::zeros(),
                 base: BaseMotion::still(),
                 activity: [0.0; N],
