@@ -30,6 +30,7 @@ WHOLE = 2000
 _WORD = re.compile(r"[^\W\d][\w.-]*\w")
 _PROSE = re.compile(r"(<(?:p|ul|ol)\b.*?</(?:p|ul|ol)>)", flags=re.S)
 _NAMED_BLOCK = re.compile(r"^```(\w+) ([^\n\"=]+)$", flags=re.M)
+_PICTURE = re.compile(r'(<img [^>]*\bsrc="([^"]+)"[^>]*>)')
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', flags=re.S)
 
 
@@ -59,7 +60,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def on_page_content(html_text: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Set formulas as MathML, which browsers show without a script."""
+    """Set formulas as MathML, which browsers show without a script, and let figures be opened."""
 
     def formula(found: re.Match[str]) -> str:
         block = found[1] == "div"
@@ -67,8 +68,8 @@ def on_page_content(html_text: str, page: Page, config: MkDocsConfig, files: Fil
         # A formula that is wider than a phone scrolls, also from the keyboard.
         return text.replace("<math ", '<math tabindex="0" ', 1) if block else text
 
-    # A corner without a heading is no heading.
-    return _FORMULA.sub(formula, html_text).replace("<th></th>", "<td></td>")
+    # A figure is small on a phone; touched, it opens by itself. A corner without a heading is no heading.
+    return _PICTURE.sub(r'<a href="\2">\1</a>', _FORMULA.sub(formula, html_text)).replace("<th></th>", "<td></td>")
 
 
 def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
