@@ -192,7 +192,7 @@ def test_a_movement_that_all_repeats_show_against_the_model_is_not_a_wrong_label
             (np.column_stack((t.q, measured(t) * t.force_on_arm)), np.column_stack((t.q, given(t) * t.force_on_arm))) for t in data.trials
         ]
         return [
-            SimulatedTrial(t.file, 0, False, t.rate, np.array(t.valid), m, {"given": g}, {})
+            SimulatedTrial(t.file, 0, False, t.rate, np.repeat(t.valid[:, None], m.shape[1], axis=1), m, {"given": g}, {})
             for t, (m, g) in zip(data.trials, sides, strict=True)
         ]
 

@@ -167,7 +167,7 @@ def test_sums_are_those_of_numpy() -> None:
     rng = np.random.default_rng(3)
     for n in (1, 7, 8, 9, 127, 128, 129, 1000, 4097):
         measured, shown = rng.normal(size=(2, n, 1))
-        trial = _armrs.SimulatedTrial("a", 0, True, 50.0, np.ones(n, dtype=bool), measured, {"given": shown}, {})
+        trial = _armrs.SimulatedTrial("a", 0, True, 50.0, np.ones((n, 1), dtype=bool), measured, {"given": shown}, {})
         assert _armrs.sizes([trial], "given") == [float(np.sqrt(np.mean(np.square(shown - measured)[:, 0])))]
         assert pickle.loads(pickle.dumps(trial)) == trial
 
