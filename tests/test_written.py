@@ -12,6 +12,7 @@ import armrs
 from armrs.cli import main
 from armrs.workflows import history
 from armrs.workflows.experiment import load_experiment
+from sessions import again
 
 VERSIONS = sorted((Path(__file__).parent / "written").iterdir())
 
@@ -45,7 +46,8 @@ def test_a_history_goes_on(written: Path, tmp_path: Path) -> None:
     shutil.copy(written / "history.sqlite", file)
     first = history.read(file)
     found = armrs.identify(armrs.load_dataset(written / "data"), with_effects=["coulomb", "viscous"])
-    longer = history.add(file, found, "2030-01-01")
+    # Another recording of the same: a copy is refused where the history knows its samples.
+    longer = history.add(file, again(found, 1), "2030-01-01")
     assert {course.dates for course in first.courses} == {("2026-11-25",)}
     assert {course.dates for course in longer.courses} >= {("2026-11-25", "2030-01-01")}
 
