@@ -69,17 +69,18 @@ int main() {
   return support.torque({0, 0}).value[0] == 3.0 ? 0 : 4;
 }
 """
-PROJECT = """\
+MAJOR, MINOR, _ = armrs.__version__.split(".")
+PROJECT = f"""\
 cmake_minimum_required(VERSION 3.20)
 project(user C CXX)
-find_package(armrs 0.1 REQUIRED)
+find_package(armrs {MAJOR}.{MINOR} REQUIRED)
 add_executable(in_c main.c)
 set_target_properties(in_c PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
 add_executable(in_cpp main.cpp)
 set_target_properties(in_cpp PROPERTIES CXX_STANDARD 17 CXX_EXTENSIONS OFF)
 foreach(program in_c in_cpp)
-  target_compile_options(${program} PRIVATE -Wall -Wextra -Werror -pedantic)
-  target_link_libraries(${program} PRIVATE armrs::armrs)
+  target_compile_options(${{program}} PRIVATE -Wall -Wextra -Werror -pedantic)
+  target_link_libraries(${{program}} PRIVATE armrs::armrs)
 endforeach()
 """
 
@@ -119,10 +120,11 @@ def test_a_project_finds_the_library_with_cmake(installed: Path, tmp_path: Path)
 
 
 def test_a_project_that_asks_for_another_version_does_not_find_it(installed: Path, tmp_path: Path) -> None:
-    (tmp_path / "CMakeLists.txt").write_text(PROJECT.replace("armrs 0.1", "armrs 0.2"), encoding="utf-8")
+    later = f"{MAJOR}.{int(MINOR) + 1}"
+    (tmp_path / "CMakeLists.txt").write_text(PROJECT.replace(f"armrs {MAJOR}.{MINOR}", f"armrs {later}"), encoding="utf-8")
     command = [cmake(), "-S", ".", "-B", "build", f"-DCMAKE_PREFIX_PATH={installed}"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode != 0 and 'compatible with requested version "0.2"' in " ".join(done.stderr.split())
+    assert done.returncode != 0 and f'compatible with requested version "{later}"' in " ".join(done.stderr.split())
 
 
 def test_the_example_for_ros_carries_half_of_an_arm(installed: Path, tmp_path: Path) -> None:
