@@ -420,17 +420,13 @@ def test_the_range_of_a_protocol_is_not_tested_for_a_change() -> None:
     assert not moved.changed and moved.values.tolist() == [1.0, 1.4]
 
 
-def test_movements_of_other_speeds_are_not_compared(tmp_path: Path) -> None:
+def test_movements_of_other_speeds_are_not_compared() -> None:
     """What resists depends on the speed: a changed protocol looked like a change of the joint."""
     from armrs.workflows import courses
 
     def history_at(*speeds: float) -> courses.History:
-        with contextlib.closing(sqlite3.connect(tmp_path / f"{speeds[-1]}.sqlite")) as file:
-            file.executescript(
-                "CREATE TABLE session (id INTEGER PRIMARY KEY, name, date, method, joints);"
-                "CREATE TABLE arm (session, side, recording_sha256);"
-                "CREATE TABLE estimate (session, name, kind, joint, value, std, unit, decided_by);"
-            )
+        with contextlib.closing(sqlite3.connect(":memory:")) as file:
+            file.executescript(f"{sessions._SCHEMA} {sessions._ARM}")
             for k, speed in enumerate(speeds, start=1):
                 file.execute("INSERT INTO session VALUES (?, 's', ?, 'passive', 2)", (k, f"2026-0{k}-05"))
                 for name, value, unit in (("half_width", 0.2 + 0.2 * speed, "N m"), ("speed", speed, "rad/s")):

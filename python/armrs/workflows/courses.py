@@ -211,7 +211,7 @@ def history_of(connection: sqlite3.Connection, method: str, subject: str | None,
     points, elsewhere = _by_parameter(same), _by_parameter(there)
     followed = {key: own_points for key, own_points in points.items() if own_points[-1][3] == session}
     decided = _decided(known) if method in _TOGETHER else None
-    slower = _at_other_speeds({**points, **{key: [*points.get(key, ()), *more] for key, more in elsewhere.items()}}, followed)
+    slower = _at_other_speeds(_by_parameter([*same, *there]), followed)
 
     def compare(key: _Key, with_points: Sequence[_Point]) -> list[_Point]:
         alike = _comparable(with_points, followed[key][-1], key[2], decided)
