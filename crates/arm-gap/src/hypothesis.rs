@@ -124,21 +124,24 @@ impl<const N: usize> Hypothesis<N> {
 
     /// The amplitude of the spring whose rest angle a number is.
     pub fn spring_that_rests(&self, target: Target) -> Option<f64> {
-        let (effect, parameter) = match target {
-            Target::Known(e, p) => (&self.known[e], p),
-            Target::Named(e, p) => (&self.named[e], p),
-            _ => return None,
-        };
+        let (effect, parameter) = self.law_of(target)?;
         let (amplitude, rest) = spring(effect)?;
         (parameter == rest).then_some(effect.parameters[amplitude])
     }
 
+    /// The known or named effect that a number is a parameter of, and which one.
+    fn law_of(&self, target: Target) -> Option<(&Effect<f64>, usize)> {
+        match target {
+            Target::Known(e, p) => Some((&self.known[e], p)),
+            Target::Named(e, p) => Some((&self.named[e], p)),
+            _ => None,
+        }
+    }
+
     /// Whether a number is the angle of a joint about which a law lies, such as a rest angle.
     pub fn is_joint_angle(&self, target: Target) -> bool {
-        let (effect, parameter) = match target {
-            Target::Known(e, p) => (&self.known[e], p),
-            Target::Named(e, p) => (&self.named[e], p),
-            _ => return false,
+        let Some((effect, parameter)) = self.law_of(target) else {
+            return false;
         };
         let info = &effect.kind.info().parameters[parameter];
         // A phase is an angle of no joint.
