@@ -26,6 +26,8 @@ const SHARE: f64 = 1e-4;
 const LITTLE: f64 = 0.25;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
+/// Most fits that go on from where a fit ended.
+const ON: usize = 4;
 /// Times that a fit is simulated anew from where it ended.
 const AGAIN: usize = 8;
 
@@ -168,9 +170,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 self.equations_with(point, &fitted, (&each, &Columns::default()));
             let equations = Equations::new(&clusters, hypothesis, &coordinates);
             let next = |step: &Step| {
-                let along = step.usable.iter().map(|&i| &coordinates[i]);
-                let along = std::iter::zip(along, step.sizes.iter().copied());
-                let moved = hypothesis.moved(&along.collect::<Vec<_>>());
+                let moved = step.from(hypothesis, &coordinates);
                 let next = self.state(point, moved, fitted.asked.clone()).ok()?;
                 (next.cost < fitted.cost).then_some(next)
             };
@@ -196,6 +196,36 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             slopes = (gained < NEAR * fitted.enough()).then_some(responses);
         }
         Ok(fitted)
+    }
+
+    /// Fits on from where a fit ended, also over rising ground: from where a whole step leads, the next fit may come down elsewhere.
+    ///
+    /// A size and the angle about which its law lies form a bent valley, along which steps that lower the cost are short.
+    pub(crate) fn fit_on(
+        &self,
+        point: &LinearizationPoint<N>,
+        mut fitted: FittedHypothesis<N>,
+    ) -> FittedHypothesis<N> {
+        for _ in 0..ON {
+            let on = self.fit_after_whole_step(point, &fitted);
+            let Some(on) = on.filter(|on| on.cost < fitted.cost - fitted.enough()) else {
+                break;
+            };
+            fitted = on;
+        }
+        fitted
+    }
+
+    /// A fit from where an undamped step leads; `None` where that cannot be followed.
+    fn fit_after_whole_step(
+        &self,
+        point: &LinearizationPoint<N>,
+        fitted: &FittedHypothesis<N>,
+    ) -> Option<FittedHypothesis<N>> {
+        let (coordinates, clusters) = self.equations(point, fitted, &Columns::default()).ok()?;
+        let equations = Equations::new(&clusters, &fitted.hypothesis, &coordinates);
+        let start = equations.step(0.0)?.from(&fitted.hypothesis, &coordinates);
+        self.fit(point, start, fitted.asked.clone()).ok()
     }
 
     /// Squares of what a fitted hypothesis leaves of each cluster when the others alone decide its numbers, to first order.
@@ -271,6 +301,19 @@ pub(crate) struct Step {
     pub sizes: Vec<f64>,
     /// By how much it lowers the cost, to first order.
     pub gain: f64,
+}
+
+impl Step {
+    /// A hypothesis after the step.
+    fn from<const N: usize>(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        coordinates: &[Coordinate],
+    ) -> Hypothesis<N> {
+        let along = self.usable.iter().map(|&i| &coordinates[i]);
+        let along = std::iter::zip(along, self.sizes.iter().copied());
+        hypothesis.moved(&along.collect::<Vec<_>>())
+    }
 }
 
 /// The normal equations of a step, with the room that bounds leave it.

@@ -432,7 +432,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let mut asked = candidate(choice).clone();
             (asked.price, asked.spread) = (score_test.price[member], score_test.spread[member]);
             let choice = (std::slice::from_ref(&asked), choice.coefficients.as_slice());
-            let again = self.attempt(from, choice, point)?;
+            let mut again = self.attempt(from, choice, point)?;
+            if own.is_of_family_in_joint(&asked.effect) {
+                again = self.fit_on(point, again);
+            }
             let effect = again.hypothesis.named.last().copied();
             let effect = effect.filter(|effect| !asked.is_plainer(effect))?;
             let worse = (again.cost - fitted.cost) / scale + asked.price - own.price;
