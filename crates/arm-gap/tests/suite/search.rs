@@ -150,3 +150,25 @@ fn friction_that_the_model_lacks_sticks_where_the_joint_does() {
     // What is no unknown is not refined.
     assert!(finding.amended.asked[0].refined.is_empty());
 }
+
+/// A cubic spring that rests 0.7 rad beyond the movements shows what an end-range moment shows: whichever is named, the other one is stated.
+#[test]
+fn a_law_of_the_family_that_shows_the_same_is_stated_though_its_fit_is_long() {
+    let of =
+        |kind: &str, values: &[f64]| Effect::new(Kind::named(kind).expect("known"), 1).with(values);
+    let elastic = of("elastic", &[0.8, 0.9]);
+    let mut session = session(&[elastic, of("cubic_elastic", &[0.1, 0.0])], (3e-3, 0.3));
+    session.effects.push(elastic);
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let finding = prepared.search(&|_, _| Ok(())).expect("a finding");
+    assert_eq!(finding.named.len(), 1);
+    let one = &finding.named[0];
+    let named = finding.amended.hypothesis.named[one.slot];
+    let others = one.alternatives.iter().map(|a| a.effect);
+    let stated: Vec<&str> = std::iter::once(named)
+        .chain(others)
+        .map(|e| e.kind.info().kind)
+        .collect();
+    assert!(stated.contains(&"cubic_elastic"), "{stated:?}");
+    assert!(stated.contains(&"end_range"), "{stated:?}");
+}
