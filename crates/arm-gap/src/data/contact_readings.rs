@@ -6,7 +6,7 @@
 use arm_core::effect::{Effect, Place};
 use arm_core::{Chain, Joints, Placement, Plane, Pose, Reading, Setup, jacobian, static_torque};
 use arm_sim::{Interpolation, Series};
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
 use crate::GapError;
 use crate::data::session::{ComparisonMode, Session};
@@ -48,7 +48,8 @@ impl<const N: usize> Session<N> {
 }
 
 impl<const N: usize> ContactReadings<N> {
-    /// The predicted channels at a sample for required joint torques \[N m\]: the torques of the readings minus their residual.
+    /// The predicted channels at a sample for required joint torques \[N m\], and how they follow these: the torques of the readings minus
+    /// their residual.
     ///
     /// What is left is a force that is missing, which counts as the sensors would read it, and what no force is, which counts as much more
     /// as forces are read larger: a gain or a length with which everything shrinks explains nothing.
@@ -66,7 +67,7 @@ impl<const N: usize> ContactReadings<N> {
         misread: Joints<f64, N>,
         (sample, time): (usize, f64),
         needed: Joints<f64, N>,
-    ) -> Joints<f64, N> {
+    ) -> (Joints<f64, N>, SMatrix<f64, N, N>) {
         /// Part of a Jacobian's square that keeps the force of a stretched arm finite.
         const SMALL: f64 = 1e-6;
         let [y, z, moment] = self.force.at(time).value;
@@ -85,16 +86,17 @@ impl<const N: usize> ContactReadings<N> {
         let mut square = moves * moves.transpose();
         let size = square.trace();
         square += Matrix2::from_diagonal_element(SMALL * size);
-        let missing = square
-            .try_inverse()
-            .map_or_else(Vector2::zeros, |inverse| inverse * (moves * left));
-        let beyond = left - moves.transpose() * missing;
+        let inverse = square.try_inverse().unwrap_or_else(Matrix2::zeros);
+        let of_missing = inverse * moves;
+        let beyond = SMatrix::identity() - moves.transpose() * of_missing;
         let larger = libm::sqrt(moves_as_read.norm_squared() / size);
-        read - moves_as_read.transpose() * missing - beyond * larger
+        let follow = moves_as_read.transpose() * of_missing + beyond * larger;
+        (read - follow * left, follow)
     }
 }
 
 /// What the sensors of the contact force do to it: they are affine in force and moment.
+#[derive(PartialEq)]
 pub(crate) struct Sensing {
     effects: Vec<Effect<f64>>,
     gains: Matrix3<f64>,

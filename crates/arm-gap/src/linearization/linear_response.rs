@@ -12,6 +12,7 @@ use crate::hypothesis::Hypothesis;
 use crate::linearization::linearized_run::{ASTRAY, Linear};
 use crate::linearization::origin::Origin;
 use crate::linearization::plant::{Balance, Hand, Plant, balance, hands};
+use crate::measurement_model::joint_torques::beyond;
 use crate::measurement_model::start::held_at_start;
 
 /// Response of the channels to one unit of a number, by group.
@@ -252,34 +253,5 @@ impl<const N: usize> Linear<'_, N> {
         let samples = steps.saturating_sub(1) * self.grid.stride / self.grid.parts;
         let known = |channel: &Vec<f64>| channel[..samples.min(channel.len())].to_vec();
         Some(origin.shown.iter().map(known).collect())
-    }
-}
-
-/// The effects of one list that another does not have.
-fn beyond(effects: &[Effect<f64>], others: &[Effect<f64>]) -> Vec<Effect<f64>> {
-    let mut others = others.to_vec();
-    let is_new = |effect: &&Effect<f64>| match others.iter().position(|o| o == *effect) {
-        Some(same) => {
-            others.swap_remove(same);
-            false
-        }
-        None => true,
-    };
-    effects.iter().filter(is_new).copied().collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use arm_core::effect::Kind;
-
-    use super::*;
-
-    #[test]
-    fn of_two_lists_of_effects_what_both_have_counts_once_for_each() {
-        let of = |size: f64| Effect::<f64>::new(Kind::Viscous, 1).with(&[size]);
-        let (one, two, three) = (of(1.0), of(2.0), of(3.0));
-        assert_eq!(beyond(&[one, two, one], &[one, three]), [two, one]);
-        assert_eq!(beyond(&[one, three], &[one, two, one]), [three]);
-        assert!(beyond(&[two, one], &[one, two]).is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! One simulated run with the equation of motion linearised along it, and its response to changes.
+//! One simulated run with the equation of motion linearised along it, or the torques of one measured motion, and their response to changes.
 
 mod follower;
 pub mod linear_response;
@@ -7,3 +7,4 @@ mod newton;
 pub(crate) mod origin;
 mod plant;
 mod sliding;
+pub(crate) mod torques_beside;

@@ -1,14 +1,48 @@
 //! Joint torques by inverse dynamics of the measured motion.
 
 use arm_core::effect::{Effect, MAX_STATES, Motion, advance_states, resisting_torque};
-use arm_core::{Joints, Pose, Reading, inverse_dynamics, joint_force};
+use arm_core::{Joints, Pose, Reading, Setup, inverse_dynamics, joint_force};
 use arm_ident::regression::kinematics::Kinematics;
 use arm_sim::SimulationError;
+use nalgebra::SMatrix;
 
 use crate::data::contact_readings::Sensing;
-use crate::data::course::{Channels, Course};
+use crate::data::course::{Channels, Course, difference};
 use crate::data::session::Session;
 use crate::hypothesis::Hypothesis;
+
+/// The channels of a trial under a rig in whose joints nothing acts, and how they follow what acts there. Most hypotheses differ in that alone.
+pub(crate) struct RigTorques<const N: usize> {
+    rig: Rig<N>,
+    /// Length of a sample \[s\].
+    interval: f64,
+    motions: Vec<Motion<f64, N>>,
+    /// At every sample \[N m\].
+    alone: Vec<Joints<f64, N>>,
+    /// Change of the channels for what each joint resists with. Nothing changes those of joints that dry friction holds.
+    follow: Vec<SMatrix<f64, N, N>>,
+}
+
+/// What the channels depend on besides what acts in joints.
+#[derive(PartialEq)]
+struct Rig<const N: usize> {
+    setup: Setup<f64, N>,
+    sensing: Sensing,
+    offsets: Joints<f64, N>,
+    eccentricity: [[f64; 2]; N],
+}
+
+impl<const N: usize> Rig<N> {
+    fn of(session: &Session<N>, hypothesis: &Hypothesis<N>) -> Result<Self, SimulationError> {
+        let effects = hypothesis.effects();
+        Ok(Self {
+            setup: session.rig(hypothesis)?,
+            sensing: Sensing::of(&effects),
+            offsets: offsets(&effects),
+            eccentricity: hypothesis.eccentricity,
+        })
+    }
+}
 
 impl<const N: usize> Session<N> {
     /// Joint torques by inverse dynamics of the measured motion; where dry friction holds a joint, what was measured.
@@ -20,45 +54,125 @@ impl<const N: usize> Session<N> {
         hypothesis: &Hypothesis<N>,
         course: &Course<N>,
     ) -> Result<Channels, SimulationError> {
+        match self.rig_torques(hypothesis, course)? {
+            Some(rig) => Ok(rig.with(&hypothesis.effects())),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// The same before anything acts in joints; `None` where no motion was measured.
+    ///
+    /// # Errors
+    /// As [`Session::torques`].
+    pub(crate) fn rig_torques(
+        &self,
+        hypothesis: &Hypothesis<N>,
+        course: &Course<N>,
+    ) -> Result<Option<RigTorques<N>>, SimulationError> {
         let Some(motion) = &course.motion else {
-            return Ok(Vec::new());
+            return Ok(None);
         };
-        let effects = hypothesis.effects();
-        let setup = self.rig(hypothesis)?;
-        let arm = setup.chain()?;
-        let sensors = Sensing::of(&effects);
-        let offset = offsets(&effects);
-        let mut states = vec![[0.0; MAX_STATES]; effects.len()];
-        let mut before: Option<Motion<f64, N>> = None;
-        let mut channels = vec![Vec::with_capacity(course.times.len()); N];
+        let rig = Rig::of(self, hypothesis)?;
+        let arm = rig.setup.chain()?;
+        let count = course.times.len();
+        let mut out = RigTorques {
+            interval: 1.0 / course.rate,
+            motions: Vec::with_capacity(count),
+            alone: Vec::with_capacity(count),
+            follow: Vec::with_capacity(count),
+            rig,
+        };
         for (i, &time) in course.times.iter().enumerate() {
             let (q, qd, qdd) = true_motion(hypothesis, motion, i);
             let chain = motion.chain_in_moving_frame(&arm, i);
-            let q = q - offset;
+            let bend = motion.q[i] - q;
+            let q = q - out.rig.offsets;
             let pose = Pose::new(&q);
             let through = joint_force(&chain, &pose, (&qd, &qdd), [0.0; 2]);
             let mut at = Motion::new(time, q, qd).with_joint_force(&through);
             at.qdd = qdd;
-            if let Some(from) = before.replace(at) {
-                advance_states(&effects, (&from, &at), &mut states, 1.0 / course.rate);
-            }
-            let torque = inverse_dynamics(&chain, &pose, &qd, &qdd)
-                + resisting_torque(&effects, &at, &states);
-            let torque = match &course.contact {
+            out.motions.push(at);
+            let needed = inverse_dynamics(&chain, &pose, &qd, &qdd);
+            let (mut alone, mut follow) = match &course.contact {
                 Some(contact) => {
-                    let bend = motion.q[i] - true_motion(hypothesis, motion, i).0;
-                    let rig = (&self.chain, &arm, &setup, &sensors);
-                    contact.missing_force(rig, offset + bend, (i, time), torque)
+                    let rig = (&self.chain, &arm, &out.rig.setup, &out.rig.sensing);
+                    contact.missing_force(rig, out.rig.offsets + bend, (i, time), needed)
                 }
-                None => torque,
+                None => (needed, SMatrix::identity()),
             };
+            for j in (0..N).filter(|&j| course.at_rest.get(j).is_some_and(|rest| rest[i])) {
+                alone[j] = course.raw[j][i];
+                follow.fill_row(j, 0.0);
+            }
+            out.alone.push(alone);
+            out.follow.push(follow);
+        }
+        Ok(Some(out))
+    }
+}
+
+impl<const N: usize> RigTorques<N> {
+    /// The channels with what acts in joints \[N m\].
+    pub(crate) fn with(&self, effects: &[Effect<f64>]) -> Channels {
+        self.channels(effects, |i, resisting| {
+            self.alone[i] + self.follow[i] * resisting
+        })
+    }
+
+    /// How much more the channels of another hypothesis show, before the low-pass; `None` where its rig or its sensors are others.
+    ///
+    /// * `own` - of which these torques are
+    ///
+    /// # Errors
+    /// As [`Session::torques`].
+    pub(crate) fn difference(
+        &self,
+        session: &Session<N>,
+        own: &Hypothesis<N>,
+        other: &Hypothesis<N>,
+    ) -> Result<Option<Channels>, SimulationError> {
+        if Rig::of(session, other)? != self.rig {
+            return Ok(None);
+        }
+        let (own, other) = (own.effects(), other.effects());
+        let more = self.channels(&beyond(&other, &own), |i, torque| self.follow[i] * torque);
+        let less = self.channels(&beyond(&own, &other), |i, torque| self.follow[i] * torque);
+        Ok(Some(difference(&more, &less)))
+    }
+
+    /// Channels from what effects resist with at every sample.
+    fn channels(
+        &self,
+        effects: &[Effect<f64>],
+        one: impl Fn(usize, Joints<f64, N>) -> Joints<f64, N>,
+    ) -> Channels {
+        let mut states = vec![[0.0; MAX_STATES]; effects.len()];
+        let mut channels = vec![Vec::with_capacity(self.motions.len()); N];
+        for (i, at) in self.motions.iter().enumerate() {
+            if i > 0 {
+                let from = &self.motions[i - 1];
+                advance_states(effects, (from, at), &mut states, self.interval);
+            }
+            let shown = one(i, resisting_torque(effects, at, &states));
             for (j, channel) in channels.iter_mut().enumerate() {
-                let is_held = course.at_rest.get(j).is_some_and(|rest| rest[i]);
-                channel.push(if is_held { course.raw[j][i] } else { torque[j] });
+                channel.push(shown[j]);
             }
         }
-        Ok(channels)
+        channels
     }
+}
+
+/// The effects of one list that another does not have.
+pub(crate) fn beyond(effects: &[Effect<f64>], others: &[Effect<f64>]) -> Vec<Effect<f64>> {
+    let mut others = others.to_vec();
+    let is_new = |effect: &&Effect<f64>| match others.iter().position(|o| o == *effect) {
+        Some(same) => {
+            others.swap_remove(same);
+            false
+        }
+        None => true,
+    };
+    effects.iter().filter(is_new).copied().collect()
 }
 
 /// Angles, speeds and accelerations at a sample, without what an eccentric encoder adds to them.
@@ -119,6 +233,15 @@ mod tests {
     use super::*;
     use crate::data::course::tests::of_one;
     use crate::data::session::ComparisonMode;
+
+    #[test]
+    fn of_two_lists_of_effects_what_both_have_counts_once_for_each() {
+        let of = |size: f64| Effect::<f64>::new(Kind::Viscous, 1).with(&[size]);
+        let (one, two, three) = (of(1.0), of(2.0), of(3.0));
+        assert_eq!(beyond(&[one, two, one], &[one, three]), [two, one]);
+        assert_eq!(beyond(&[one, three], &[one, two, one]), [three]);
+        assert!(beyond(&[two, one], &[one, two]).is_empty());
+    }
 
     /// Circles of an arm that its contact moves, read by sensors with every fault that there is.
     #[test]
@@ -190,5 +313,32 @@ mod tests {
             assert!(left(&others, place) > 0.01, "{:?}", faults[without].kind);
         }
         assert!(left(&faults, [0.0; 2]) > 0.01);
+
+        let mut own = session.given();
+        own.named = faults.to_vec();
+        let rig = session.rig_torques(&own, &course).expect("a rig");
+        let rig = rig.expect("a measured motion");
+        for (kind, values) in [
+            (Kind::Viscous, &[0.2][..]),
+            (Kind::Relaxation, &[1.5, 0.4]),
+            (Kind::Thixotropy, &[0.3]),
+            (Kind::LoadFriction, &[0.05]),
+        ] {
+            let mut other = own.clone();
+            other.named.push(Effect::new(kind, 1).with(values));
+            let more = rig.difference(&session, &own, &other).expect("possible");
+            let [before, after] =
+                [&own, &other].map(|h| session.torques(h, &course).expect("torques"));
+            let whole = difference(&after, &before);
+            let pairs = std::iter::zip(more.expect("one rig").concat(), whole.concat());
+            let (apart, size) = pairs.fold((0.0_f64, 0.0_f64), |(apart, size), (a, b)| {
+                (apart.max((a - b).abs()), size.max(b.abs()))
+            });
+            assert!(apart < 1e-12 && size > 0.01, "{kind:?}: {apart} of {size}");
+        }
+        let mut other = own.clone();
+        other.named.pop();
+        let more = rig.difference(&session, &own, &other).expect("possible");
+        assert!(more.is_none(), "another delay of the force");
     }
 }

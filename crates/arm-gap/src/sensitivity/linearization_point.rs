@@ -14,6 +14,7 @@ use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::linearization::linear_response::{Change, Response};
 use crate::linearization::linearized_run::{ASTRAY, Linear};
 use crate::linearization::origin::Origin;
+use crate::linearization::torques_beside::TorquesBeside;
 use crate::prepared_session::{PreparedSession, SimulatedRuns};
 use crate::sensitivity::rows::WhitenedRows;
 
@@ -258,28 +259,36 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         point: &LinearizationPoint<N>,
         changes: &[Change<N>],
     ) -> Vec<Result<Response, GapError>> {
-        self.each_response_from(point, (&[], &point.shown), changes)
+        self.each_response_from(point, (&point.hypothesis, &[]), changes)
     }
 
     /// The same for changes of another hypothesis, along the runs of the linearization point.
     ///
-    /// * `origins`, `base` - that hypothesis beside each run, or nothing for that of the point; and where torques are compared, what it shows
+    /// * `origins` - that hypothesis beside each run; nothing for that of the point, and where torques are compared
     fn each_response_from(
         &self,
         point: &LinearizationPoint<N>,
-        (origins, base): (&[Origin<N>], &[Channels]),
+        (hypothesis, origins): (&Hypothesis<N>, &[Origin<N>]),
         changes: &[Change<N>],
     ) -> Vec<Result<Response, GapError>> {
         let groups = self.references.len();
+        let torques = match self.session.comparison {
+            ComparisonMode::Led => Vec::new(),
+            ComparisonMode::Torque => self.parallel(groups, |group| {
+                let course = &self.courses[self.references[group]];
+                TorquesBeside::of(self.session, hypothesis, course)
+            }),
+        };
         let one = |job: usize| {
             let (change, group) = (&changes[job / groups], job % groups);
             let trial = self.references[group];
             let response = match (point.lines.get(group), origins.get(group)) {
                 (Some(line), Some(origin)) => line.response_from(origin, change),
                 (Some(line), None) => line.response(change),
-                (None, _) => self
-                    .follow(point, &change.changed, (group, &self.courses[trial]))
-                    .map(|shown| slope(&shown, &base[group], change.size)),
+                (None, _) => match &torques[group] {
+                    Ok(beside) => beside.response(change),
+                    Err(error) => Err(error.clone()),
+                },
             };
             response.map_err(|source| GapError::Simulation { trial, source })
         };
@@ -343,11 +352,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         };
         let origins = self.parallel(point.lines.len(), origin);
         let origins = origins.into_iter().collect::<Result<Vec<_>, _>>()?;
-        let base = match point.lines.is_empty() {
-            true => self.shown(point, hypothesis)?,
-            false => Vec::new(),
-        };
-        let all = self.each_response_from(point, (&origins, &base), &changes);
+        let all = self.each_response_from(point, (hypothesis, &origins), &changes);
         all.into_iter().collect()
     }
 

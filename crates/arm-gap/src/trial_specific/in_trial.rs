@@ -10,14 +10,14 @@ use arm_core::effect::{Effect, Nature};
 use arm_numerics::Matrix;
 use arm_sim::SimulationError;
 
-use crate::data::course::{Channels, Course, difference, smooth};
+use crate::data::course::{Channels, Course, difference};
 use crate::data::noise::dot;
 use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::hypothesis::{Hypothesis, Target};
 use crate::linearization::linear_response::Change;
-use crate::linearization::linearized_run::{ASTRAY, Linear};
+use crate::linearization::linearized_run::Linear;
+use crate::linearization::torques_beside::TorquesBeside;
 use crate::prepared_session::PreparedSession;
-use crate::sensitivity::linearization_point::slope;
 use crate::sensitivity::normal_equations::solve;
 use crate::trial_specific::component::{SLOW, shapes_of};
 
@@ -113,13 +113,15 @@ fn in_phase(rhythms: &mut [Effect<f64>], sizes: &[f64]) {
     }
 }
 
-/// What the sensors would read of one trial under a hypothesis, in the common band, and the run along which small changes of it are computed.
+/// What the sensors would read of one trial under a hypothesis, in the common band, and what small changes of it are computed from.
 struct ShownTrial<'a, const N: usize> {
-    session: &'a Session<N>,
-    course: &'a Arc<Course<N>>,
-    /// Nothing where torques are compared.
-    line: Option<Linear<'a, N>>,
+    beside: Beside<'a, N>,
     shown: Channels,
+}
+
+enum Beside<'a, const N: usize> {
+    Run(Box<Linear<'a, N>>),
+    Torques(TorquesBeside<'a, N>),
 }
 
 impl<'a, const N: usize> ShownTrial<'a, N> {
@@ -128,32 +130,26 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
         hypothesis: &Hypothesis<N>,
         course: &'a Arc<Course<N>>,
     ) -> Result<Self, SimulationError> {
-        let line = match session.comparison {
-            ComparisonMode::Led => Some(Linear::along(session, hypothesis, course)?),
-            ComparisonMode::Torque => None,
+        let beside = match session.comparison {
+            ComparisonMode::Led => {
+                Beside::Run(Box::new(Linear::along(session, hypothesis, course)?))
+            }
+            ComparisonMode::Torque => {
+                Beside::Torques(TorquesBeside::of(session, hypothesis, course)?)
+            }
         };
-        let mut trial = Self {
-            session,
-            course,
-            line,
-            shown: Vec::new(),
+        let shown = match &beside {
+            Beside::Run(line) => line.shown()?,
+            Beside::Torques(torques) => torques.shown()?,
         };
-        trial.shown = match &trial.line {
-            Some(line) => line.shown()?,
-            None => trial.torques(hypothesis)?,
-        };
-        Ok(trial)
+        Ok(Self { beside, shown })
     }
 
     /// What the sensors would read more, for one unit of a change.
     fn response(&self, change: &Change<N>) -> Result<Channels, SimulationError> {
-        match &self.line {
-            Some(line) => line.response(change),
-            None => Ok(slope(
-                &self.torques(&change.changed)?,
-                &self.shown,
-                change.size,
-            )),
+        match &self.beside {
+            Beside::Run(line) => line.response(change),
+            Beside::Torques(torques) => torques.response(change),
         }
     }
 
@@ -172,11 +168,6 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
             }
         }
         Ok(columns)
-    }
-
-    fn torques(&self, hypothesis: &Hypothesis<N>) -> Result<Channels, SimulationError> {
-        let raw = self.session.torques(hypothesis, self.course)?;
-        smooth(&raw, self.course.band, self.course.rate).map_err(|_| ASTRAY)
     }
 }
 

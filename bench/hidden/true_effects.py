@@ -1,0 +1,67 @@
+"""What the true effects close of the gap, beside what the named ones close: `python bench/hidden/true_effects.py FOLDER...` after score.py.
+
+Prepared arms whose names are right and whose gap counts are searched again with their true effects at their true values in the model; what
+is left then is what no name could have closed. In the worlds of rapier and MuJoCo the law of the catalogue is not quite that of the world.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from score import CLOSED, as_in_file, closure, force_on
+
+
+def with_truth(session: Path, folder: Path) -> None:
+    """Copy the data of a session, with its true effects in the model."""
+    truth = as_in_file(json.loads((session / "truth.json").read_text(encoding="utf-8")), force_on(session))
+    shutil.copytree(session / "data", folder)
+    lines = []
+    for effect in truth["effects"]:
+        lines += ["", "[[effect]]", f"kind = {json.dumps(effect['kind'])}"]
+        lines += [f"{key} = {json.dumps(effect[key])}" for key in ("joint", "channel") if effect.get(key) is not None]
+        lines += [f"{name} = {parameter['value']!r}" for name, parameter in effect["parameters"].items()]
+    with (folder / "model.toml").open("a", encoding="utf-8") as model:
+        model.write("\n".join(lines) + "\n")
+
+
+def closed_by_truth(session: Path) -> float | None:
+    """Return the part of the gap that the true effects close; None where armrs refuses the model."""
+    with tempfile.TemporaryDirectory() as place:
+        data, result = Path(place, "data"), Path(place, "gap.json")
+        with_truth(session, data)
+        subprocess.run([sys.executable, "-m", "armrs", "gap", data, "--json", result], capture_output=True, check=False)
+        if not result.is_file():
+            return None
+        left = json.loads(result.read_text(encoding="utf-8"))["gap"]
+    gap: dict[str, Any] = json.loads((session / "gap.json").read_text(encoding="utf-8"))["gap"]
+    return closure({name: {**channel, "after": left[name]["calibrated"]} for name, channel in gap.items() if name in left})
+
+
+def main() -> None:
+    """Print a line for each session that counts, and in how many of them 90 % is closed."""
+    counted: list[tuple[float, float | None]] = []
+    for folder in map(Path, sys.argv[1:]):
+        for line in map(json.loads, (folder / "scores.jsonl").read_text(encoding="utf-8").splitlines()):
+            if line["error"] or line["family"] == "little_known" or not line["hidden"] or line.get("closure") is None:
+                continue
+            if line["names"]["decided"] != line["names"]["decided_right"]:
+                continue
+            truth = closed_by_truth(folder / line["session"])
+            counted.append((line["closure"], truth))
+            names = " + ".join(line["hidden"])
+            print(
+                f"{folder.name} {line['session']} {names}: named {line['closure']:.3f}, true {truth if truth is None else round(truth, 3)}"
+            )
+    named = sum(closed >= CLOSED for closed, _ in counted)
+    true = sum(closed is not None and closed >= CLOSED for _, closed in counted)
+    print(f"closed by {CLOSED:.0%}: named {named} of {len(counted)}, true {true} of {len(counted)}")
+
+
+if __name__ == "__main__":
+    main()
