@@ -121,7 +121,7 @@ struct ShownTrial<'a, const N: usize> {
 
 enum Beside<'a, const N: usize> {
     Run(Box<Linear<'a, N>>),
-    Torques(TorquesBeside<'a, N>),
+    Torques(Box<TorquesBeside<'a, N>>),
 }
 
 impl<'a, const N: usize> ShownTrial<'a, N> {
@@ -135,7 +135,7 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
                 Beside::Run(Box::new(Linear::along(session, hypothesis, course)?))
             }
             ComparisonMode::Torque => {
-                Beside::Torques(TorquesBeside::of(session, hypothesis, course)?)
+                Beside::Torques(Box::new(TorquesBeside::of(session, hypothesis, course)?))
             }
         };
         let shown = match &beside {
