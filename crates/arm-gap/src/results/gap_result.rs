@@ -151,6 +151,7 @@ impl GapResult {
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
             warnings: held_in_motion(prepared.session)
                 .into_iter()
+                .chain(finding.withheld.iter().map(withheld))
                 .chain(refitted_far)
                 .collect(),
             model: amended.amended(input.model, &locked)?,
@@ -196,6 +197,15 @@ fn held_in_motion<const N: usize>(session: &Session<N>) -> Vec<String> {
         )
     };
     session.held_in_motion().into_iter().map(line).collect()
+}
+
+/// A warning for a joint in which names are withheld.
+fn withheld(joint: &usize) -> String {
+    format!(
+        "in joint {}, more is missing than springs, viscosity and dry friction, and it is not named: without robot angles, no effect of the \
+         catalogue closes the gap of the torque of this joint",
+        joint + 1
+    )
 }
 
 /// An open channel as a row of a list.

@@ -16,6 +16,12 @@ use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, Sear
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 
+/// Times that laws of the base may take the place of a name in the end: a spring over two joints and the springs of both, which show the
+/// same, would take each other's place for ever.
+const EXCHANGES_OF_BASE: usize = 3;
+/// Times that names may be withheld: what takes the place of one may be another one in the same joint.
+const WITHHOLDINGS: usize = 3;
+
 /// What was found.
 #[derive(Clone, Debug)]
 pub struct Finding<const N: usize> {
@@ -25,6 +31,8 @@ pub struct Finding<const N: usize> {
     pub amended: FittedHypothesis<N>,
     /// The named effects, those that explain most first.
     pub named: Vec<MissingEffect>,
+    /// Joints in which names are withheld, because their torque stays open whatever is named.
+    pub withheld: Vec<usize>,
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,
     /// The calibrated and the amended model as they are in each trial; see [`crate::trial_specific::in_trial`].
@@ -61,8 +69,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         mut apart: TrialSpecificEffects<N>,
         progress: Progress<'_>,
     ) -> Result<Finding<N>, GapError> {
-        let base;
+        let mut base;
         (state, named, base) = self.judged_with_base((state, named), apart.periodic, progress)?;
+        let mut withheld = Vec::new();
+        for _ in 0..WITHHOLDINGS {
+            let joints = self.withhold(&mut state)?;
+            if joints.is_empty() {
+                break;
+            }
+            withheld.extend(joints);
+            (state, named) = self.judged(state, apart.periodic, progress)?;
+            (state, named, base) =
+                self.judged_with_base((state, named), apart.periodic, progress)?;
+        }
+        withheld.sort_unstable();
+        withheld.dedup();
         let SearchState {
             mut calibrated,
             mut before,
@@ -105,6 +126,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             calibrated,
             amended,
             named,
+            withheld,
             trial_specific: apart.trial_specific,
             in_trials,
             search_trace,
@@ -127,10 +149,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let found = (state.current.asked.clone(), self.dropped.clone());
         let settled = self.afresh((state.current, state.point));
         let mut settled = self.with_friction_at_rest(settled)?;
+        let mut exchanges = 0;
         let base = loop {
             let (with_base, base) = self.judged_base(settled, state.scale)?;
             // What a name with shapes of its own made too weak may stand in for that name.
-            if let Some(instead) = self.with_base_instead(&with_base.0, &with_base.1)? {
+            if exchanges < EXCHANGES_OF_BASE
+                && let Some(instead) = self.with_base_instead(&with_base.0, &with_base.1)?
+            {
+                exchanges += 1;
                 settled = instead;
                 continue;
             }

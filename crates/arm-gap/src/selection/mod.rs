@@ -4,6 +4,7 @@ mod friction_at_rest;
 pub mod held_out;
 pub mod model_discrimination;
 pub mod model_selection;
+mod open_joints;
 pub mod passive_base;
 mod passive_base_evidence;
 pub mod score_test;

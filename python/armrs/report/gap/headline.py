@@ -35,6 +35,7 @@ something outside the catalogue is missing, false names close up to three quarte
 _COUNTS = 0.1
 """Share of the floor by which a gap lies above it at least where the share of it that is closed is worth a number."""
 _NAMELESS = "something that no effect of the catalogue explains"
+_SMALL = "something too small to show on test trials, which no effect of the catalogue explains"
 _NO_TEST = "there is no test trial to measure the gap on"
 _SIZED = 2
 """Effects whose sizes stand in the sentence; of more it only gives the names."""
@@ -135,6 +136,8 @@ def headline(result: Mapping[str, Any]) -> str:
 
 def _beyond(result: Mapping[str, Any], opened: Sequence[str]) -> str:
     """Return what is missing beyond the names: nothing nameable, or the laws of the only joints that are open, which friction holds."""
+    if not opened and any(g["after"] is not None for g in result["gap"].values()):
+        return _SMALL
     held = {w["joint"] for w in result["would_have_seen"] if w["at_least"] is None and not w["price"]}
     stuck = sorted(j for j in held if j and any(name.startswith(f"q{j}_") for name in opened))
     if not stuck or len(stuck) < len(opened):

@@ -244,8 +244,13 @@ def missing(data: Mapping[str, Any]) -> Table:
         if repeated:
             without = effect.get("without")
             alone = "–" if without is None else digits(without, 2)
-        fitted = {n: v for n, v in effect["parameters"].items() if v["std"] is not None}
-        used = {n: v for n, v in effect["parameters"].items() if v["value"]}  # a parameter of zero is one that the law does without
+        given = effect["parameters"]
+        # The place of a moment that is zero is none, that of another one belongs to its size.
+        moments = {name: given.get(f"{name}_moment") for name in given}
+        placed = {name for name, moment in moments.items() if moment is None or moment["value"]}
+        fitted = {n: v for n, v in given.items() if v["std"] is not None or (moments[n] and n in placed)}
+        fitted = fitted if any(v["std"] is not None for v in fitted.values()) else {}
+        used = {n: v for n, v in given.items() if v["value"] and n in placed}  # a parameter of zero is one that the law does without
         for k, (name, value) in enumerate((fitted or used or effect["parameters"]).items()):
             head = [effect["kind"], place, alone] if k == 0 else ["", "", ""]
             factor, held_in = formatting.read_in(value["unit"])

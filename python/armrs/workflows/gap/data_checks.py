@@ -13,6 +13,7 @@ from ...errors import BadInput, Text
 from ...io.dataset import Dataset
 from ...io.plausibility import mean_gap, refuse_implausible
 from ...io.trial import Trial, constant
+from ...model import Model
 from ..setup_check import examine_setup, other_weight
 from .core_input import core_settings, core_trials
 from .unresolved_motion import unresolved
@@ -34,6 +35,8 @@ _STARTING = 0.02
 """Time between the samples from which the speed of the robot at the start of a trial is computed [s]."""
 _AT_REST = 0.05
 """Speed of a robot's joint up to which it counts as resting [rad/s]: four samples of an encoder of 0.1 mrad give it to 0.02."""
+_MOVED = 1.0
+"""Stated uncertainties of masses by which a fit must move them for another weight to be reported."""
 _FIRST = 16
 """Samples at the start that are compared first to find copies: no trial has fewer."""
 
@@ -106,6 +109,29 @@ def _off_handle(dataset: Dataset, led: bool) -> list[str]:
 def _other_weight(dataset: Dataset, led: bool) -> list[str]:
     found = other_weight(dataset)
     return [] if found is None else [str(found)]
+
+
+def refuted(dataset: Dataset, fitted: Model) -> list[str]:
+    """Return the remark on the weight of the arm where a fit with more laws than springs and friction does not bear it out.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    fitted : Model
+        With segments refitted beside the effects that were found: a law that the model lacks may ask for other masses until it is named.
+    """
+    found = other_weight(dataset)
+    if found is None:
+        return []
+    moved = _weight_moment(fitted) / _weight_moment(dataset.model) - 1.0
+    towards = moved if found.factor > 1.0 else -moved
+    return [] if towards >= _MOVED * dataset.model.segment_uncertainty else [str(found)]
+
+
+def _weight_moment(model: Model) -> float:
+    """Return the moment of the stretched arm about its first joint, without gravity [kg m]."""
+    before = np.concatenate([[0.0], np.cumsum([s.length for s in model.segments])[:-1]])
+    return float(sum(s.mass * (d + s.com) for s, d in zip(model.segments, before, strict=True)))
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:

@@ -171,14 +171,16 @@ _ALONE = 4.0
 def shape(found: Sequence[Discrepancy]) -> str | None:
     """Describe the residual in words: in which joint it is, and on what it depends; None where there is none.
 
-    Shares are of the mean square of the torque that is left in the fit trials, less its mean.
+    What is left of a joint is what its repeats share: the joint with the longest lever has most noise of the force. Shares are of the mean
+    square of the torque in the fit trials, less its mean.
     """
     own = [d for d in found if d.trial.role == "fit" and all(d.valid(j).sum() >= _FEWEST for j in range(d.q.shape[1]))]
     if not own:
         return None
     size = np.array([[float(np.mean(d.torque[d.valid(j), j] ** 2)) for j in range(d.q.shape[1])] for d in own])
-    j = int(np.argmax(size.mean(axis=0)))
-    where = f"joint {j + 1} ({math.sqrt(float(size[:, j].mean())):.2g} N m, root mean square)"
+    shared = np.array([_shared(own, j) for j in range(size.shape[1])])
+    j = int(np.argmax(shared if shared.any() else size.mean(axis=0)))
+    where = f"joint {j + 1} ({math.sqrt(float(shared[j] or size[:, j].mean())):.2g} N m, root mean square)"
     if len(own) > 2 and size[:, j].max() > _ALONE * max(float(np.median(size[:, j])), 1e-300):
         worst = own[int(np.argmax(size[:, j]))]
         return f"most of it lies in {where}, and in one trial, {worst.trial.file}"
@@ -187,6 +189,20 @@ def shape(found: Sequence[Discrepancy]) -> str | None:
     if shares[name] < _CLEAR:
         return f"most of it lies in {where}; it follows neither angle, speed nor time of the movement clearly"
     return f"most of it lies in {where}; {shares[name]:.0%} of it follows {name}"
+
+
+def _shared(own: Sequence[Discrepancy], j: int) -> float:
+    """Return the mean square of what the repeats of each movement share in joint `j` [N² m²]; all of it of a movement without repeats."""
+    squares, samples = 0.0, 0
+    for configuration in dict.fromkeys(d.trial.configuration for d in own):
+        repeats = [np.where(d.valid(j), d.torque[:, j], np.nan) for d in own if d.trial.configuration == configuration]
+        stack = np.array([r[: min(map(len, repeats))] for r in repeats])
+        stack = stack[:, np.isfinite(stack).all(axis=0)]
+        number, length = stack.shape
+        scatter = float(stack.var(axis=0, ddof=1).sum()) / number if number > 1 else 0.0
+        squares += float((stack.mean(axis=0) ** 2).sum()) - scatter
+        samples += length
+    return max(squares, 0.0) / max(samples, 1)
 
 
 def _described(own: Sequence[Discrepancy], j: int, columns: Any) -> float:

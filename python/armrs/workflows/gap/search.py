@@ -98,7 +98,9 @@ def _searched(dataset: Dataset, own: Sequence[str], threads: int | None, progres
         return residual_maps.discrepancies(dataset, led, result.trials, version)
 
     looks_like = residual_maps.shape(lacking("amended")) if result.verdict == "unexplained" else None
-    told = result.replace(places=residual_maps.places(lacking("calibrated")), looks_like=looks_like, warnings=(*warnings, *result.warnings))
+    wrong = data_checks.refuted(dataset, result.model)
+    warned = [*(line for line in warnings if line not in wrong), *result.warnings]
+    told = result.replace(places=residual_maps.places(lacking("calibrated")), looks_like=looks_like, warnings=tuple(warned))
     return GapFound(told, dataset)
 
 

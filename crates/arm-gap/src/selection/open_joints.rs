@@ -1,0 +1,105 @@
+//! Names that are withheld without robot angles: those in joints whose torque stays open whatever is named.
+//!
+//! Where friction holds a joint, what it resists with is unknown, and its law is wrong about the moments before and after. On an arm whose
+//! joints have no known law, other laws then bend to that error without closing the gap.
+
+use arm_core::effect::{Effect, Place};
+
+use crate::GapError;
+use crate::fitting::fit::FittedHypothesis;
+use crate::prepared_session::PreparedSession;
+use crate::selection::held_out::{TrialResidual, held_out};
+use crate::selection::search_state::SearchState;
+
+impl<'a, const N: usize> PreparedSession<'a, N> {
+    /// Withholds names of open joints; the joints, none where nothing is withheld.
+    pub(crate) fn withhold(
+        &mut self,
+        state: &mut SearchState<'a, N>,
+    ) -> Result<Vec<usize>, GapError> {
+        if !self.session.compares_contact_torques() || self.session.base.is_empty() {
+            return Ok(Vec::new());
+        }
+        let open = self.open_joints(&state.current);
+        let mut hypothesis = state.current.hypothesis.clone();
+        let mut asked = state.current.asked.clone();
+        let mut joints = Vec::new();
+        for slot in (0..asked.len()).rev() {
+            let effect = hypothesis.named[slot];
+            let mut own = (0..N).filter(|&j| open[j] && acts_in(&effect, j));
+            if let Some(joint) = own.next().filter(|_| !self.is_passive_law(&effect)) {
+                hypothesis.named.remove(slot);
+                asked.remove(slot);
+                joints.push(joint);
+            }
+        }
+        if !joints.is_empty() {
+            (state.current, state.point) = self.settle(hypothesis, asked)?;
+            // Laws of the base that others had replaced come back.
+            if let Some(revived) = self.with_base_revived(&state.current)? {
+                (state.current, state.point) = revived;
+            }
+        }
+        Ok(joints)
+    }
+
+    /// The joints whose torque a model leaves open on the fit trials.
+    fn open_joints(&self, fitted: &FittedHypothesis<N>) -> [bool; N] {
+        let each = std::iter::zip(&self.fitted, &fitted.residuals);
+        let trials: Vec<TrialResidual> = each
+            .map(|(&trial, residuals)| TrialResidual {
+                group: self.group_of[trial],
+                test: true,
+                rate: self.courses[trial].rate,
+                residuals: Some(residuals.clone()),
+                counted: (0..N).map(|joint| self.moves_at(trial, joint)).collect(),
+            })
+            .collect();
+        let gaps = held_out(&trials);
+        std::array::from_fn(|joint| gaps.get(joint).is_some_and(|gap| gap.open.is_some()))
+    }
+
+    /// The samples of a trial that count and at which friction does not hold a joint.
+    fn moves_at(&self, trial: usize, joint: usize) -> Vec<bool> {
+        let course = &self.courses[trial];
+        let rests = |i: usize| course.at_rest.get(joint).is_some_and(|rest| rest[i]);
+        let counts = |i: usize| {
+            course.counted[i] && !rests(i) && !self.is_left_out(trial, i as f64 / course.rate)
+        };
+        (0..course.counted.len()).map(counts).collect()
+    }
+
+    /// Whether an effect is a law that every passive joint may have.
+    fn is_passive_law(&self, effect: &Effect<f64>) -> bool {
+        let mut base = self.session.base.iter();
+        base.any(|law| law.effect.kind == effect.kind)
+    }
+}
+
+/// Whether an effect acts in a joint or in the sensor of its angle.
+fn acts_in(effect: &Effect<f64>, joint: usize) -> bool {
+    match effect.kind.info().place {
+        Place::Joint => joint == effect.index || effect.kind.crosses() && joint + 1 == effect.index,
+        Place::AngleSensor => joint == effect.index,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    #[test]
+    fn a_spring_over_two_joints_acts_in_both_and_a_bias_of_the_force_in_none() {
+        let places = |kind, index| -> Vec<bool> {
+            let effect = Effect::new(kind, index);
+            (0..3).map(|joint| acts_in(&effect, joint)).collect()
+        };
+        assert_eq!(places(Kind::Biarticular, 2), [false, true, true]);
+        assert_eq!(places(Kind::Relaxation, 1), [false, true, false]);
+        assert_eq!(places(Kind::AngleOffset, 0), [true, false, false]);
+        assert_eq!(places(Kind::ForceBias, 1), [false; 3]);
+    }
+}
