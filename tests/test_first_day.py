@@ -24,6 +24,7 @@ from armrs.io.raw import RawTable, read_raw
 from armrs.io.raw.table import Remark, column, remarks_of
 from armrs.report import console, html, plotting, run_animation
 from armrs.workflows import setup_check
+from armrs.workflows.gap import data_checks
 from armrs.workflows.importing import clock_offset, handle_positions, offset_search
 from armrs.workflows.importing.column_guess import symbol_of
 from armrs.workflows.importing.file_remarks import timed
@@ -223,6 +224,21 @@ def test_forces_in_another_unit_and_another_body_are_told(imported: Path, tmp_pa
     assert "a wrong body mass" in str(found) and "lbf" not in str(found)
     assert setup_check.other_weight(dataset.replace(model=heavy.replace(gravity=0.0))) is None
     assert torque_balance.weight_of(dataset.model, [still(dataset)]) is None
+
+
+def test_another_weight_that_the_named_effects_explain_is_taken_back(imported: Path) -> None:
+    """A relaxation in the shoulder was named right below a warning of a sixth of the weight, which the fit beside it did not bear out."""
+    wrong = in_pounds(armrs.load_dataset(imported))
+    model = wrong.model
+
+    def fitted(factor: float) -> armrs.Model:
+        return model.replace(segments=[s.replace(mass=factor * s.mass) for s in model.segments])
+
+    within, beyond = 1.0 + 0.9 * model.segment_uncertainty, 1.0 + 1.1 * model.segment_uncertainty
+    (line,) = data_checks.refuted(wrong, fitted(within))
+    assert line == str(setup_check.other_weight(wrong))
+    assert data_checks.refuted(wrong, fitted(1.0 / beyond)) == [line]
+    assert data_checks.refuted(wrong, fitted(beyond)) == []
 
 
 def still(dataset: armrs.Dataset) -> torque_balance.Motion:

@@ -169,6 +169,12 @@ def test_names_that_leave_the_gap_open_are_what_comes_nearest() -> None:
         assert heading(told) == "Missing from the model"
 
 
+def test_what_is_left_beside_closed_gaps_is_called_small() -> None:
+    """Something that no effect explains was said to be missing, and in the same sentence that the gap falls to what repeats differ by."""
+    told = headline(result("unexplained", DRY))
+    assert ", and something too small to show on test trials, which no effect of the catalogue explains: with it, the gap of" in told
+
+
 def test_what_the_result_calls_open_counts_with_its_place() -> None:
     listed = [{"channel": "q3_rad", "trial": "trials/fast_2.csv", "t_start": 3.14, "t_end": 4.6}]
     told = result("unexplained", DRY, open=listed)

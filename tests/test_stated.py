@@ -69,6 +69,20 @@ def test_the_worth_of_an_effect_is_told_in_units_of_the_scatter() -> None:
     assert sentences.missing(unrepeated).rows[0][2] == "< 1 %" and "Share: " in sentences.worth(unrepeated)
 
 
+def test_a_moment_is_told_with_the_angle_at_which_it_holds() -> None:
+    """`0.43 N m` of an end of the range was told without its angle, and the angle of another end whose moment is zero."""
+
+    def of(std: float | None) -> dict[str, Any]:
+        interval = None if std is None else [0.4, 0.46]
+        moment, none = {"value": 0.43, "std": std, "interval": interval, "unit": "N m"}, {"std": None, "interval": None}
+        others = {"lower_moment": none | {"value": 0.0, "unit": "N m"}, "upper": none | {"value": 0.354, "unit": "rad"}}
+        return {"upper_moment": moment, **others, "lower": none | {"value": -2.0, "unit": "rad"}}
+
+    for std in (0.01, None):
+        found = {"effects": [effect(kind="end_range", parameters=of(std))]}
+        assert [row[3] for row in sentences.missing(found).rows] == ["upper_moment", "upper"]
+
+
 def test_sentences_write_a_value_and_its_interval_in_one_way() -> None:
     """The sentence of a reflex had one digit more than that of a gap: above 91.7 °/s (95 % interval 88.2 to 95.1)."""
 
@@ -134,6 +148,26 @@ def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
     )
     assert "2430 times" in said[0] and "more than 100 standard deviations" in said[0]
     assert "(+0.0 standard deviations; limit 6)" in said[1]
+
+
+def test_what_is_left_lies_where_repeats_share_it() -> None:
+    """The joint with the longest lever was named, whose torque held most noise of the force sensor."""
+    t, random = np.arange(0.0, 8.0, 0.01), np.random.default_rng(4)
+    q = np.column_stack([np.sin(t), np.cos(t)])
+    repeats = [
+        SimpleNamespace(
+            trial=SimpleNamespace(role="fit", configuration="reach", file=f"reach_{k}.csv", t=t, rate=100.0),
+            q=q,
+            qd=np.gradient(q, 0.01, axis=0),
+            torque=random.normal(0.0, [0.05, 0.002], (len(t), 2)) + np.column_stack([0.0 * t, 0.02 * q[:, 0]]),
+            valid=lambda _: np.full(len(t), True),
+        )
+        for k in range(3)
+    ]
+    said = residual_maps.shape(repeats)  # type: ignore[arg-type]
+    assert said is not None and said.startswith("most of it lies in joint 2 (0.014 N m, root mean square)")
+    alone = residual_maps.shape(repeats[:1])  # type: ignore[arg-type]
+    assert alone is not None and alone.startswith("most of it lies in joint 1 (0.051 N m")
 
 
 def test_cells_that_are_not_clear_do_not_look_unvisited() -> None:

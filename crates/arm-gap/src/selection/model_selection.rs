@@ -415,17 +415,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             singles.extend(both.filter(|(part, ..)| is_kin || *part > LEAST_ALTERNATIVE_GAIN));
         }
         singles.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // The best of each effect.
         let candidate = |choice: &Choice| &library.candidates[choice.members[0]];
-        let mut best: Vec<&(f64, Choice, (&ScoreTest, &FittedHypothesis<N>))> = Vec::new();
-        for single in &singles {
-            let effect = &candidate(&single.1).effect;
-            if best.len() < CONVERGED_ALTERNATIVES
-                && !best.iter().any(|b| candidate(&b.1).is_same_effect(effect))
-            {
-                best.push(single);
-            }
-        }
+        let best = best_of_each(&singles, library);
         let converged = |place: usize| {
             let (_, choice, (score_test, from)) = best[place];
             let member = choice.members[0];
@@ -504,6 +495,26 @@ impl<const N: usize> SearchState<'_, N> {
             mimicked_by_any(effect, &self.current.asked, explained),
         )
     }
+}
+
+/// The best choice of each effect, of the best effects.
+///
+/// * `singles` - choices of one candidate each, the best first
+fn best_of_each<'s, T>(
+    singles: &'s [(f64, Choice, T)],
+    library: &Library,
+) -> Vec<&'s (f64, Choice, T)> {
+    let candidate = |choice: &Choice| &library.candidates[choice.members[0]];
+    let mut best: Vec<&(f64, Choice, T)> = Vec::new();
+    for single in singles {
+        let effect = &candidate(&single.1).effect;
+        if best.len() < CONVERGED_ALTERNATIVES
+            && !best.iter().any(|b| candidate(&b.1).is_same_effect(effect))
+        {
+            best.push(single);
+        }
+    }
+    best
 }
 
 /// The candidates that are neither an effect nor among those that are named beside it.

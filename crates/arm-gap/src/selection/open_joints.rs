@@ -4,9 +4,11 @@
 //! joints have no known law, other laws then bend to that error without closing the gap.
 
 use arm_core::effect::{Effect, Place};
+use arm_ident::regression::trial::Role;
 
 use crate::GapError;
-use crate::fitting::fit::FittedHypothesis;
+use crate::data::course::{Channels, difference, smooth};
+use crate::hypothesis::Hypothesis;
 use crate::prepared_session::PreparedSession;
 use crate::selection::held_out::{TrialResidual, held_out};
 use crate::selection::search_state::SearchState;
@@ -20,7 +22,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if !self.session.compares_contact_torques() || self.session.base.is_empty() {
             return Ok(Vec::new());
         }
-        let open = self.open_joints(&state.current);
+        let open = self.open_joints(&state.current.hypothesis);
         let mut hypothesis = state.current.hypothesis.clone();
         let mut asked = state.current.asked.clone();
         let mut joints = Vec::new();
@@ -43,20 +45,35 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(joints)
     }
 
-    /// The joints whose torque a model leaves open on the fit trials.
-    fn open_joints(&self, fitted: &FittedHypothesis<N>) -> [bool; N] {
-        let each = std::iter::zip(&self.fitted, &fitted.residuals);
-        let trials: Vec<TrialResidual> = each
-            .map(|(&trial, residuals)| TrialResidual {
-                group: self.group_of[trial],
-                test: true,
-                rate: self.courses[trial].rate,
-                residuals: Some(residuals.clone()),
-                counted: (0..N).map(|joint| self.moves_at(trial, joint)).collect(),
-            })
-            .collect();
-        let gaps = held_out(&trials);
-        std::array::from_fn(|joint| gaps.get(joint).is_some_and(|gap| gap.open.is_some()))
+    /// The joints whose torque a model leaves open, on the fit trials or on the test trials. These can only take a name away.
+    fn open_joints(&self, hypothesis: &Hypothesis<N>) -> [bool; N] {
+        let left = self.parallel(self.courses.len(), |trial| self.left_of(hypothesis, trial));
+        let gaps = [Role::Fit, Role::Test].map(|role| {
+            let trials: Vec<TrialResidual> = left
+                .iter()
+                .enumerate()
+                .map(|(trial, residuals)| TrialResidual {
+                    group: self.group_of[trial],
+                    test: self.session.trials[trial].role == role,
+                    rate: self.courses[trial].rate,
+                    residuals: residuals.clone(),
+                    counted: (0..N).map(|joint| self.moves_at(trial, joint)).collect(),
+                })
+                .collect();
+            held_out(&trials)
+        });
+        std::array::from_fn(|joint| {
+            let mut own = gaps.iter().filter_map(|gaps| gaps.get(joint));
+            own.any(|gap| gap.open.is_some())
+        })
+    }
+
+    /// What a model leaves of the torques of a trial, in the common band.
+    fn left_of(&self, hypothesis: &Hypothesis<N>, trial: usize) -> Option<Channels> {
+        let course = &self.courses[trial];
+        let raw = self.session.torques(hypothesis, course).ok()?;
+        let shown = smooth(&raw, course.band, course.rate).ok()?;
+        Some(difference(&course.seen, &shown))
     }
 
     /// The samples of a trial that count and at which friction does not hold a joint.
