@@ -227,7 +227,7 @@ def test_forces_in_another_unit_and_another_body_are_told(imported: Path, tmp_pa
 
 
 def test_another_weight_that_the_named_effects_explain_is_taken_back(imported: Path) -> None:
-    """A relaxation in the shoulder was named right below a warning of a sixth of the weight, which the fit beside it did not bear out."""
+    """A relaxation of the shoulder was named correctly, but a warning about a sixth of the weight remained that the fit did not confirm."""
     wrong = in_pounds(armrs.load_dataset(imported))
     model = wrong.model
 

@@ -170,7 +170,7 @@ def test_names_that_leave_the_gap_open_are_what_comes_nearest() -> None:
 
 
 def test_what_is_left_beside_closed_gaps_is_called_small() -> None:
-    """Something that no effect explains was said to be missing, and in the same sentence that the gap falls to what repeats differ by."""
+    """One sentence said both that something unexplained is missing and that the gap falls to the scatter between repeats."""
     told = headline(result("unexplained", DRY))
     assert ", and something too small to show on test trials, which no effect of the catalogue explains: with it, the gap of" in told
 

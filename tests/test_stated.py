@@ -70,7 +70,7 @@ def test_the_worth_of_an_effect_is_told_in_units_of_the_scatter() -> None:
 
 
 def test_a_moment_is_told_with_the_angle_at_which_it_holds() -> None:
-    """`0.43 N m` of an end of the range was told without its angle, and the angle of another end whose moment is zero."""
+    """An end-range moment of `0.43 N m` was printed without its angle, but with that of the other end, whose moment is zero."""
 
     def of(std: float | None) -> dict[str, Any]:
         interval = None if std is None else [0.4, 0.46]
@@ -151,7 +151,7 @@ def test_standard_deviations_beyond_a_hundred_are_not_counted() -> None:
 
 
 def test_what_is_left_lies_where_repeats_share_it() -> None:
-    """The joint with the longest lever was named, whose torque held most noise of the force sensor."""
+    """The joint with the longest lever arm was stated, because its torque contained the most noise of the force sensor."""
     t, random = np.arange(0.0, 8.0, 0.01), np.random.default_rng(4)
     q = np.column_stack([np.sin(t), np.cos(t)])
     repeats = [

@@ -1,7 +1,10 @@
-"""What the true effects close of the gap, beside what the named ones close: `python bench/hidden/true_effects.py FOLDER...` after score.py.
+"""Share of the gap that the true effects close, compared with the named ones.
 
-Prepared arms whose names are right and whose gap counts are searched again with their true effects at their true values in the model; what
-is left then is what no name could have closed. In the worlds of rapier and MuJoCo the law of the catalogue is not quite that of the world.
+    python bench/hidden/true_effects.py out/hidden/scored [FOLDER...]
+
+Run it after score.py, on the same folders. Each prepared arm with right names and a gap that counts is searched again, with its true
+effects at their true values in the model. The gap that remains bounds what right names can close. In rapier and MuJoCo, the laws differ
+slightly from those of the catalogue.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from score import CLOSED, as_in_file, closure, force_on
 
 
 def with_truth(session: Path, folder: Path) -> None:
-    """Copy the data of a session, with its true effects in the model."""
+    """Copy the data of a session, and add its true effects to the model."""
     truth = as_in_file(json.loads((session / "truth.json").read_text(encoding="utf-8")), force_on(session))
     shutil.copytree(session / "data", folder)
     lines = []
@@ -31,7 +34,7 @@ def with_truth(session: Path, folder: Path) -> None:
 
 
 def closed_by_truth(session: Path) -> float | None:
-    """Return the part of the gap that the true effects close; None where armrs refuses the model."""
+    """Return the share of the gap that the true effects close; None if armrs gives no result."""
     with tempfile.TemporaryDirectory() as place:
         data, result = Path(place, "data"), Path(place, "gap.json")
         with_truth(session, data)
@@ -44,7 +47,7 @@ def closed_by_truth(session: Path) -> float | None:
 
 
 def main() -> None:
-    """Print a line for each session that counts, and in how many of them 90 % is closed."""
+    """Print one line for each session that counts, and the number of sessions with at least 90 % of the gap closed."""
     counted: list[tuple[float, float | None]] = []
     for folder in map(Path, sys.argv[1:]):
         for line in map(json.loads, (folder / "scores.jsonl").read_text(encoding="utf-8").splitlines()):

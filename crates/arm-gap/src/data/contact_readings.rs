@@ -48,11 +48,12 @@ impl<const N: usize> Session<N> {
 }
 
 impl<const N: usize> ContactReadings<N> {
-    /// The predicted channels at a sample for required joint torques \[N m\], and how they follow these: the torques of the readings minus
-    /// their residual.
+    /// The predicted channels at a sample for required joint torques \[N m\], and their derivative with respect to these torques. The
+    /// channels are the torques of the readings minus the residual.
     ///
-    /// What is left is a force that is missing, which counts as the sensors would read it, and what no force is, which counts as much more
-    /// as forces are read larger: a gain or a length with which everything shrinks explains nothing.
+    /// The residual has two parts. A contact force can produce the first part, which is scaled to what the sensors would read of this
+    /// force. The second part is scaled by the ratio of the norms of both Jacobians (as read, true). Without this scaling, a small gain or
+    /// length would shrink the residual.
     ///
     /// * `nominal`, `chain`, `setup` - the arm with which the channels were computed; the arm and the rig as a hypothesis has them
     /// * `misread` - what the angle sensors add \[rad\]

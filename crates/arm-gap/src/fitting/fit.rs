@@ -26,7 +26,7 @@ const SHARE: f64 = 1e-4;
 const LITTLE: f64 = 0.25;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
-/// Most fits that go on from where a fit ended.
+/// Maximum number of further fits in [`PreparedSession::fit_on`], each from the end of the fit before.
 const ON: usize = 4;
 /// Times that a fit is simulated anew from where it ended.
 const AGAIN: usize = 8;
@@ -198,9 +198,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(fitted)
     }
 
-    /// Fits on from where a fit ended, also over rising ground: from where a whole step leads, the next fit may come down elsewhere.
+    /// Continues a fit from where an undamped step leads, even if the cost is higher there; keeps the result if its cost is lower.
     ///
-    /// A size and the angle about which its law lies form a bent valley, along which steps that lower the cost are short.
+    /// The cost as a function of a size and the rest angle of its law is a curved valley, in which steps that lower the cost are short.
     pub(crate) fn fit_on(
         &self,
         point: &LinearizationPoint<N>,
@@ -216,7 +216,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         fitted
     }
 
-    /// A fit from where an undamped step leads; `None` where that cannot be followed.
+    /// A fit that starts after an undamped step; `None` if the model cannot be evaluated there.
     fn fit_after_whole_step(
         &self,
         point: &LinearizationPoint<N>,
@@ -304,7 +304,7 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    /// A hypothesis after the step.
+    /// The hypothesis after this step from `hypothesis`.
     fn from<const N: usize>(
         &self,
         hypothesis: &Hypothesis<N>,

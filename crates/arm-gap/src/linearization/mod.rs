@@ -1,4 +1,4 @@
-//! One simulated run with the equation of motion linearised along it, or the torques of one measured motion, and their response to changes.
+//! Responses to small changes of a hypothesis: of a simulated run (linearised equation of motion) and of torques of a measured motion.
 
 mod follower;
 pub mod linear_response;

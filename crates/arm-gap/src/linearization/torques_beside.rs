@@ -1,4 +1,4 @@
-//! Responses of joint torques of a measured motion to small changes.
+//! Responses of the joint torques of a measured motion to small changes of a hypothesis.
 
 use arm_sim::SimulationError;
 
@@ -9,18 +9,20 @@ use crate::linearization::linear_response::Change;
 use crate::linearization::linearized_run::ASTRAY;
 use crate::measurement_model::joint_torques::RigTorques;
 
-/// The torques of a hypothesis on a trial, from which changes are computed.
+/// The joint torques of a hypothesis on one trial, the reference for responses to changes.
 pub(crate) struct TorquesBeside<'a, const N: usize> {
     session: &'a Session<N>,
     course: &'a Course<N>,
     hypothesis: Hypothesis<N>,
     /// `None` where no motion was measured.
     rig: Option<RigTorques<N>>,
-    /// Before the low-pass.
+    /// The torques of the hypothesis before the low-pass.
     shown: Channels,
 }
 
 impl<'a, const N: usize> TorquesBeside<'a, N> {
+    /// Computes the torques of a hypothesis on a trial.
+    ///
     /// # Errors
     /// As [`Session::torques`].
     pub fn of(
@@ -47,7 +49,7 @@ impl<'a, const N: usize> TorquesBeside<'a, N> {
         self.in_band(&self.shown)
     }
 
-    /// What the channels would show more, for one unit of a change. What acts in joints alone needs no inverse dynamics again.
+    /// Response of the channels to one unit of a change. If only effects in joints change, the inverse dynamics is not computed again.
     ///
     /// # Errors
     /// As [`Session::torques`].

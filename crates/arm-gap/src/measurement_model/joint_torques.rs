@@ -11,19 +11,21 @@ use crate::data::course::{Channels, Course, difference};
 use crate::data::session::Session;
 use crate::hypothesis::Hypothesis;
 
-/// The channels of a trial under a rig in whose joints nothing acts, and how they follow what acts there. Most hypotheses differ in that alone.
+/// The channels of a trial without effects in joints, and their derivative with respect to the torques of such effects.
+///
+/// Most hypotheses differ only in effects in joints, so this part is computed once for all of them.
 pub(crate) struct RigTorques<const N: usize> {
     rig: Rig<N>,
-    /// Length of a sample \[s\].
+    /// Time between two samples \[s\].
     interval: f64,
     motions: Vec<Motion<f64, N>>,
-    /// At every sample \[N m\].
+    /// Channels without effects in joints, at every sample \[N m\].
     alone: Vec<Joints<f64, N>>,
-    /// Change of the channels for what each joint resists with. Nothing changes those of joints that dry friction holds.
+    /// Derivative of the channels with respect to the resisting torques of the joints; zero in the row of a joint that dry friction holds.
     follow: Vec<SMatrix<f64, N, N>>,
 }
 
-/// What the channels depend on besides what acts in joints.
+/// Everything that the channels depend on except effects in joints.
 #[derive(PartialEq)]
 struct Rig<const N: usize> {
     setup: Setup<f64, N>,
@@ -60,7 +62,7 @@ impl<const N: usize> Session<N> {
         }
     }
 
-    /// The same before anything acts in joints; `None` where no motion was measured.
+    /// The part of [`Session::torques`] without effects in joints; `None` if no motion was measured.
     ///
     /// # Errors
     /// As [`Session::torques`].
@@ -112,16 +114,16 @@ impl<const N: usize> Session<N> {
 }
 
 impl<const N: usize> RigTorques<N> {
-    /// The channels with what acts in joints \[N m\].
+    /// The channels with the given effects in joints \[N m\].
     pub(crate) fn with(&self, effects: &[Effect<f64>]) -> Channels {
         self.channels(effects, |i, resisting| {
             self.alone[i] + self.follow[i] * resisting
         })
     }
 
-    /// How much more the channels of another hypothesis show, before the low-pass; `None` where its rig or its sensors are others.
+    /// The channels of `other` minus those of `own`, before the low-pass; `None` if rig or sensors of `other` differ.
     ///
-    /// * `own` - of which these torques are
+    /// * `own` - the hypothesis with which these torques were computed
     ///
     /// # Errors
     /// As [`Session::torques`].
@@ -140,7 +142,9 @@ impl<const N: usize> RigTorques<N> {
         Ok(Some(difference(&more, &less)))
     }
 
-    /// Channels from what effects resist with at every sample.
+    /// Channels from the resisting torques of effects, at every sample.
+    ///
+    /// * `one` - the channels at a sample, from its index and its resisting torques
     fn channels(
         &self,
         effects: &[Effect<f64>],
@@ -162,7 +166,7 @@ impl<const N: usize> RigTorques<N> {
     }
 }
 
-/// The effects of one list that another does not have.
+/// The effects of the first list that are not in the second; an effect that occurs twice counts twice.
 pub(crate) fn beyond(effects: &[Effect<f64>], others: &[Effect<f64>]) -> Vec<Effect<f64>> {
     let mut others = others.to_vec();
     let is_new = |effect: &&Effect<f64>| match others.iter().position(|o| o == *effect) {

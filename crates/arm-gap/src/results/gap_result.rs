@@ -202,8 +202,8 @@ fn held_in_motion<const N: usize>(session: &Session<N>) -> Vec<String> {
 /// A warning for a joint in which names are withheld.
 fn withheld(joint: &usize) -> String {
     format!(
-        "in joint {}, more is missing than springs, viscosity and dry friction, and it is not named: without robot angles, no effect of the \
-         catalogue closes the gap of the torque of this joint",
+        "joint {}: more is missing than spring, viscosity and dry friction, but it is not named, because no effect of the catalogue closes \
+         the torque gap of this joint without robot angles",
         joint + 1
     )
 }

@@ -16,10 +16,10 @@ use crate::selection::search_state::{DetectionLimit, Progress, SearchRound, Sear
 use crate::sensitivity::linearization_point::LinearizationPoint;
 use crate::trial_specific::component::TrialSpecific;
 
-/// Times that laws of the base may take the place of a name in the end: a spring over two joints and the springs of both, which show the
-/// same, would take each other's place for ever.
+/// Maximum number of times that laws of the base replace a named effect at the end of the search. Without a limit, a spring over two joints
+/// and the springs of both joints, which explain the same data, could replace each other forever.
 const EXCHANGES_OF_BASE: usize = 3;
-/// Times that names may be withheld: what takes the place of one may be another one in the same joint.
+/// Maximum number of times that names are withheld: another name in the same joint may take the place of a withheld one.
 const WITHHOLDINGS: usize = 3;
 
 /// What was found.
@@ -31,7 +31,7 @@ pub struct Finding<const N: usize> {
     pub amended: FittedHypothesis<N>,
     /// The named effects, those that explain most first.
     pub named: Vec<MissingEffect>,
-    /// Joints in which names are withheld, because their torque stays open whatever is named.
+    /// Joints in which names are withheld because their torque is open after the search, counted from 0.
     pub withheld: Vec<usize>,
     /// What is not the same in every trial.
     pub trial_specific: Vec<TrialSpecific>,

@@ -497,9 +497,9 @@ impl<const N: usize> SearchState<'_, N> {
     }
 }
 
-/// The best choice of each effect, of the best effects.
+/// The best choice of each effect, for at most [`CONVERGED_ALTERNATIVES`] effects.
 ///
-/// * `singles` - choices of one candidate each, the best first
+/// * `singles` - choices of one candidate each, sorted with the best first
 fn best_of_each<'s, T>(
     singles: &'s [(f64, Choice, T)],
     library: &Library,

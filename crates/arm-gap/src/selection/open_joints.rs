@@ -1,7 +1,7 @@
-//! Names that are withheld without robot angles: those in joints whose torque stays open whatever is named.
+//! Withholding of names in joints whose torque is open after a search without robot angles.
 //!
-//! Where friction holds a joint, what it resists with is unknown, and its law is wrong about the moments before and after. On an arm whose
-//! joints have no known law, other laws then bend to that error without closing the gap.
+//! While friction holds a joint, its friction torque is unknown, and just before and after a rest the friction law is only approximate.
+//! On an arm whose joints have no known laws, other laws then adapt to this error without closing the gap.
 
 use arm_core::effect::{Effect, Place};
 use arm_ident::regression::trial::Role;
@@ -14,7 +14,7 @@ use crate::selection::held_out::{TrialResidual, held_out};
 use crate::selection::search_state::SearchState;
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// Withholds names of open joints; the joints, none where nothing is withheld.
+    /// Removes all names but those of the passive base from open joints; returns these joints, empty if no name was removed.
     pub(crate) fn withhold(
         &mut self,
         state: &mut SearchState<'a, N>,
@@ -37,7 +37,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         if !joints.is_empty() {
             (state.current, state.point) = self.settle(hypothesis, asked)?;
-            // Laws of the base that others had replaced come back.
+            // Laws of the base that a removed effect had replaced are fitted again.
             if let Some(revived) = self.with_base_revived(&state.current)? {
                 (state.current, state.point) = revived;
             }
@@ -45,7 +45,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(joints)
     }
 
-    /// The joints whose torque a model leaves open, on the fit trials or on the test trials. These can only take a name away.
+    /// Whether the torque of each joint is open, on the fit trials or on the test trials. The result is used only to remove names.
     fn open_joints(&self, hypothesis: &Hypothesis<N>) -> [bool; N] {
         let left = self.parallel(self.courses.len(), |trial| self.left_of(hypothesis, trial));
         let gaps = [Role::Fit, Role::Test].map(|role| {
@@ -68,7 +68,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
-    /// What a model leaves of the torques of a trial, in the common band.
+    /// Residual torques of a trial (measured minus model) in the common band; `None` if the model cannot be evaluated.
     fn left_of(&self, hypothesis: &Hypothesis<N>, trial: usize) -> Option<Channels> {
         let course = &self.courses[trial];
         let raw = self.session.torques(hypothesis, course).ok()?;
@@ -76,7 +76,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Some(difference(&course.seen, &shown))
     }
 
-    /// The samples of a trial that count and at which friction does not hold a joint.
+    /// Whether each sample of a trial counts and the joint does not rest at it.
     fn moves_at(&self, trial: usize, joint: usize) -> Vec<bool> {
         let course = &self.courses[trial];
         let rests = |i: usize| course.at_rest.get(joint).is_some_and(|rest| rest[i]);
@@ -86,7 +86,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (0..course.counted.len()).map(counts).collect()
     }
 
-    /// Whether an effect is a law that every passive joint may have.
+    /// Whether an effect is of a kind of the passive base.
     fn is_passive_law(&self, effect: &Effect<f64>) -> bool {
         let mut base = self.session.base.iter();
         base.any(|law| law.effect.kind == effect.kind)

@@ -264,7 +264,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The same for changes of another hypothesis, along the runs of the linearization point.
     ///
-    /// * `origins` - that hypothesis beside each run; nothing for that of the point, and where torques are compared
+    /// * `origins` - that hypothesis along each run; empty for the hypothesis of the point itself, and if torques are compared
     fn each_response_from(
         &self,
         point: &LinearizationPoint<N>,

@@ -113,12 +113,13 @@ fn in_phase(rhythms: &mut [Effect<f64>], sizes: &[f64]) {
     }
 }
 
-/// What the sensors would read of one trial under a hypothesis, in the common band, and what small changes of it are computed from.
+/// Predicted channels of one trial under a hypothesis, in the common band, and the reference for their responses to small changes.
 struct ShownTrial<'a, const N: usize> {
     beside: Beside<'a, N>,
     shown: Channels,
 }
 
+/// Reference for responses: a simulated run if a robot leads the arm, otherwise the torques of the measured motion.
 enum Beside<'a, const N: usize> {
     Run(Box<Linear<'a, N>>),
     Torques(Box<TorquesBeside<'a, N>>),
@@ -145,7 +146,7 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
         Ok(Self { beside, shown })
     }
 
-    /// What the sensors would read more, for one unit of a change.
+    /// Response of the channels to one unit of a change.
     fn response(&self, change: &Change<N>) -> Result<Channels, SimulationError> {
         match &self.beside {
             Beside::Run(line) => line.response(change),

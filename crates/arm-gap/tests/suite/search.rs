@@ -151,7 +151,7 @@ fn friction_that_the_model_lacks_sticks_where_the_joint_does() {
     assert!(finding.amended.asked[0].refined.is_empty());
 }
 
-/// A cubic spring that rests 0.7 rad beyond the movements shows what an end-range moment shows: whichever is named, the other one is stated.
+/// A cubic spring with a rest angle 0.7 rad outside the movements explains the same data as an end-range moment: both must be stated.
 #[test]
 fn a_law_of_the_family_that_shows_the_same_is_stated_though_its_fit_is_long() {
     let of =

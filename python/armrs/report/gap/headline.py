@@ -135,7 +135,7 @@ def headline(result: Mapping[str, Any]) -> str:
 
 
 def _beyond(result: Mapping[str, Any], opened: Sequence[str]) -> str:
-    """Return what is missing beyond the names: nothing nameable, or the laws of the only joints that are open, which friction holds."""
+    """Return what is missing beyond the names: a small remainder, something without a name, or the laws of joints that friction holds."""
     if not opened and any(g["after"] is not None for g in result["gap"].values()):
         return _SMALL
     held = {w["joint"] for w in result["would_have_seen"] if w["at_least"] is None and not w["price"]}

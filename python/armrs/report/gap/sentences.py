@@ -245,7 +245,7 @@ def missing(data: Mapping[str, Any]) -> Table:
             without = effect.get("without")
             alone = "–" if without is None else digits(without, 2)
         given = effect["parameters"]
-        # The place of a moment that is zero is none, that of another one belongs to its size.
+        # An end-range moment is printed with its angle (`upper` with `upper_moment`); the angle of a moment of zero has no meaning.
         moments = {name: given.get(f"{name}_moment") for name in given}
         placed = {name for name, moment in moments.items() if moment is None or moment["value"]}
         fitted = {n: v for n, v in given.items() if v["std"] is not None or (moments[n] and n in placed)}

@@ -36,7 +36,7 @@ _STARTING = 0.02
 _AT_REST = 0.05
 """Speed of a robot's joint up to which it counts as resting [rad/s]: four samples of an encoder of 0.1 mrad give it to 0.02."""
 _MOVED = 1.0
-"""Stated uncertainties of masses by which a fit must move them for another weight to be reported."""
+"""Change of the weight that a fit must confirm for another weight to be reported, in units of the stated `segment_uncertainty`."""
 _FIRST = 16
 """Samples at the start that are compared first to find copies: no trial has fewer."""
 
@@ -112,13 +112,13 @@ def _other_weight(dataset: Dataset, led: bool) -> list[str]:
 
 
 def refuted(dataset: Dataset, fitted: Model) -> list[str]:
-    """Return the remark on the weight of the arm where a fit with more laws than springs and friction does not bear it out.
+    """Return the warning about the weight of the arm if the fit with all named effects does not confirm it; otherwise an empty list.
 
     Parameters
     ----------
     dataset : Dataset
     fitted : Model
-        With segments refitted beside the effects that were found: a law that the model lacks may ask for other masses until it is named.
+        Model with the named effects and refitted segments. Until a missing law is named, it can imitate a different weight.
     """
     found = other_weight(dataset)
     if found is None:
@@ -129,7 +129,7 @@ def refuted(dataset: Dataset, fitted: Model) -> list[str]:
 
 
 def _weight_moment(model: Model) -> float:
-    """Return the moment of the stretched arm about its first joint, without gravity [kg m]."""
+    """Return the first moment of mass of the stretched arm about its first joint [kg m]."""
     before = np.concatenate([[0.0], np.cumsum([s.length for s in model.segments])[:-1]])
     return float(sum(s.mass * (d + s.com) for s, d in zip(model.segments, before, strict=True)))
 

@@ -171,8 +171,8 @@ _ALONE = 4.0
 def shape(found: Sequence[Discrepancy]) -> str | None:
     """Describe the residual in words: in which joint it is, and on what it depends; None where there is none.
 
-    What is left of a joint is what its repeats share: the joint with the longest lever has most noise of the force. Shares are of the mean
-    square of the torque in the fit trials, less its mean.
+    The joint is the one with the largest residual common to the repeats of a movement. The whole residual would favour the joint with the
+    longest lever arm, where the force noise is largest. Shares refer to the mean square of the torque in the fit trials, about its mean.
     """
     own = [d for d in found if d.trial.role == "fit" and all(d.valid(j).sum() >= _FEWEST for j in range(d.q.shape[1]))]
     if not own:
@@ -192,7 +192,7 @@ def shape(found: Sequence[Discrepancy]) -> str | None:
 
 
 def _shared(own: Sequence[Discrepancy], j: int) -> float:
-    """Return the mean square of what the repeats of each movement share in joint `j` [N² m²]; all of it of a movement without repeats."""
+    """Return the mean square of the residual common to repeats in joint `j` [N² m²]; without repeats, of the whole residual."""
     squares, samples = 0.0, 0
     for configuration in dict.fromkeys(d.trial.configuration for d in own):
         repeats = [np.where(d.valid(j), d.torque[:, j], np.nan) for d in own if d.trial.configuration == configuration]
