@@ -151,7 +151,7 @@ impl GapResult {
             search_trace: finding.search_trace.iter().map(SearchStep::of).collect(),
             warnings: held_in_motion(prepared.session)
                 .into_iter()
-                .chain(finding.withheld.iter().map(withheld))
+                .chain(withheld(&finding.withheld))
                 .chain(refitted_far)
                 .collect(),
             model: amended.amended(input.model, &locked)?,
@@ -199,13 +199,18 @@ fn held_in_motion<const N: usize>(session: &Session<N>) -> Vec<String> {
     session.held_in_motion().into_iter().map(line).collect()
 }
 
-/// A warning for a joint in which names are withheld.
-fn withheld(joint: &usize) -> String {
-    format!(
-        "joint {}: more is missing than spring, viscosity and dry friction, but it is not named, because no effect of the catalogue closes \
-         the torque gap of this joint without robot angles",
-        joint + 1
-    )
+/// A warning about the joints in which names are withheld; `None` for none.
+fn withheld(joints: &[usize]) -> Option<String> {
+    let numbers: Vec<String> = joints.iter().map(|j| (j + 1).to_string()).collect();
+    let (last, others) = numbers.split_last()?;
+    let place = match others {
+        [] => format!("joint {last}"),
+        _ => format!("joints {} and {last}", others.join(", ")),
+    };
+    Some(format!(
+        "{place}: more is missing than spring, viscosity and dry friction, but it is not named, because no effect of the catalogue closes \
+         the torque gap without robot angles"
+    ))
 }
 
 /// An open channel as a row of a list.
@@ -324,5 +329,21 @@ impl Serialize for Screening {
         let calibrated = self.lack;
         out.serialize_field("lack_of_fit", &LackRow { calibrated })?;
         out.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joints_with_withheld_names_stand_in_one_warning() {
+        assert_eq!(withheld(&[]), None);
+        let place = |joints: &[usize]| {
+            let line = withheld(joints)?;
+            line.split(':').next().map(str::to_owned)
+        };
+        assert_eq!(place(&[2]).as_deref(), Some("joint 3"));
+        assert_eq!(place(&[0, 1, 2]).as_deref(), Some("joints 1, 2 and 3"));
     }
 }

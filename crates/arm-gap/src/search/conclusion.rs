@@ -61,29 +61,20 @@ struct AmendedModel<const N: usize> {
     lack: LackOfFit,
 }
 
+/// A search whose names and laws of the passive base were compared with alternatives.
+type Judged<'a, const N: usize> = (SearchState<'a, N>, Vec<MissingEffect>, Vec<BaseLaw<N>>);
+
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Selects the laws of the passive base, and measures what is left.
     pub(crate) fn concluded(
         &mut self,
-        (mut state, mut named): (SearchState<'a, N>, Vec<MissingEffect>),
+        (state, named): (SearchState<'a, N>, Vec<MissingEffect>),
         mut apart: TrialSpecificEffects<N>,
         progress: Progress<'_>,
     ) -> Result<Finding<N>, GapError> {
-        let mut base;
-        (state, named, base) = self.judged_with_base((state, named), apart.periodic, progress)?;
-        let mut withheld = Vec::new();
-        for _ in 0..WITHHOLDINGS {
-            let joints = self.withhold(&mut state)?;
-            if joints.is_empty() {
-                break;
-            }
-            withheld.extend(joints);
-            (state, named) = self.judged(state, apart.periodic, progress)?;
-            (state, named, base) =
-                self.judged_with_base((state, named), apart.periodic, progress)?;
-        }
-        withheld.sort_unstable();
-        withheld.dedup();
+        let judged = self.judged_with_base((state, named), apart.periodic, progress)?;
+        let ((state, mut named, base), withheld) =
+            self.without_open_names(judged, apart.periodic, progress)?;
         let SearchState {
             mut calibrated,
             mut before,
@@ -137,6 +128,32 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
+    /// Withholds the names of open joints; the joints that stay open without them.
+    fn without_open_names(
+        &mut self,
+        (mut state, mut named, mut base): Judged<'a, N>,
+        periodic: Option<[f64; 2]>,
+        progress: Progress<'_>,
+    ) -> Result<(Judged<'a, N>, Vec<usize>), GapError> {
+        let mut withheld = Vec::new();
+        for _ in 0..WITHHOLDINGS {
+            let joints = self.withhold(&mut state)?;
+            if joints.is_empty() {
+                break;
+            }
+            withheld.extend(joints);
+            (state, named) = self.judged(state, periodic, progress)?;
+            (state, named, base) = self.judged_with_base((state, named), periodic, progress)?;
+        }
+        if !withheld.is_empty() {
+            let open = self.open_joints(&state.current.hypothesis);
+            withheld.retain(|&joint| open[joint]);
+            withheld.sort_unstable();
+            withheld.dedup();
+        }
+        Ok(((state, named, base), withheld))
+    }
+
     /// Selects the laws of the base, and tests the other named effects again where the base changes: a named spring over two joints brings
     /// back the springs of both joints, and the effects that had replaced them become redundant.
     fn judged_with_base(
@@ -144,7 +161,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         (mut state, mut named): (SearchState<'a, N>, Vec<MissingEffect>),
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
-    ) -> Result<(SearchState<'a, N>, Vec<MissingEffect>, Vec<BaseLaw<N>>), GapError> {
+    ) -> Result<Judged<'a, N>, GapError> {
         progress("judging the passive base", 0.88)?;
         let found = (state.current.asked.clone(), self.dropped.clone());
         let settled = self.afresh((state.current, state.point));

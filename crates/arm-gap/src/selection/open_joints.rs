@@ -46,7 +46,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Whether the torque of each joint is open, on the fit trials or on the test trials. The result is used only to remove names.
-    fn open_joints(&self, hypothesis: &Hypothesis<N>) -> [bool; N] {
+    pub(crate) fn open_joints(&self, hypothesis: &Hypothesis<N>) -> [bool; N] {
         let left = self.parallel(self.courses.len(), |trial| self.left_of(hypothesis, trial));
         let gaps = [Role::Fit, Role::Test].map(|role| {
             let trials: Vec<TrialResidual> = left
