@@ -11,7 +11,8 @@ use arm_numerics::{Cholesky, Matrix};
 
 use crate::data::course::Channels;
 use crate::data::noise::dot;
-use crate::fitting::fit::{FittedHypothesis, Precision};
+use crate::fitting::fit::FittedHypothesis;
+use crate::fitting::precision::Precision;
 use crate::hypothesis::priors;
 use crate::hypothesis::{Coordinate, Hypothesis};
 use crate::measurement_model::free_run::{CHANGE, State, slope_into};

@@ -3,4 +3,5 @@
 pub mod fit;
 pub mod free_decay_fit;
 pub mod lack_of_fit;
+pub mod precision;
 pub mod score_variance;
