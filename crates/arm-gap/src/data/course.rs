@@ -92,6 +92,21 @@ impl<const N: usize> Course<N> {
         }
     }
 
+    /// Samples without those at which friction holds a joint of a measured motion, where enough is left: nothing says what its torque is there.
+    pub(crate) fn in_motion(&self, joint: usize, counted: Vec<bool>) -> Vec<bool> {
+        /// Shortest time that is enough \[s\].
+        const ENOUGH: f64 = 1.0;
+        let Some(rests) = self.at_rest.get(joint) else {
+            return counted;
+        };
+        let each = std::iter::zip(&counted, rests);
+        let moving: Vec<bool> = each.map(|(counted, rests)| *counted && !rests).collect();
+        match moving.iter().filter(|m| **m).count() as f64 >= ENOUGH * self.rate {
+            true => moving,
+            false => counted,
+        }
+    }
+
     /// Whether torques are compared that a contact exerts.
     pub fn has_contact_readings(&self) -> bool {
         self.contact.is_some()

@@ -100,7 +100,9 @@ impl SimulatedTrial {
             for counted in &mut trial.counted {
                 std::iter::zip(counted, &left_out).for_each(|(counted, out)| *counted &= !out);
             }
-            trial.leave_out_rest(&course.at_rest);
+            for (joint, counted) in trial.counted.iter_mut().enumerate() {
+                *counted = course.in_motion(joint, std::mem::take(counted));
+            }
             let own = plays
                 .iter()
                 .map(|(version, beliefs)| (*version, &beliefs[i]));
@@ -111,21 +113,6 @@ impl SimulatedTrial {
             trial
         };
         prepared.parallel(prepared.courses.len(), one)
-    }
-
-    /// Leaves out the torque of each joint while friction holds it, where enough is left: along a measured motion nothing says what that is.
-    ///
-    /// * `at_rest` - by joint; nothing where the motion is simulated
-    fn leave_out_rest(&mut self, at_rest: &[Vec<bool>]) {
-        /// Shortest time that is enough \[s\].
-        const ENOUGH: f64 = 1.0;
-        for (counted, rests) in std::iter::zip(&mut self.counted, at_rest) {
-            let each = std::iter::zip(&*counted, rests);
-            let moving: Vec<bool> = each.map(|(counted, rests)| *counted && !rests).collect();
-            if moving.iter().filter(|m| **m).count() as f64 >= ENOUGH * self.rate {
-                *counted = moving;
-            }
-        }
     }
 
     /// What a version shows.

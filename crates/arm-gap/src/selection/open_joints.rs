@@ -57,7 +57,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     test: self.session.trials[trial].role == role,
                     rate: self.courses[trial].rate,
                     residuals: residuals.clone(),
-                    counted: (0..N).map(|joint| self.moves_at(trial, joint)).collect(),
+                    counted: (0..N).map(|joint| self.counted_of(trial, joint)).collect(),
                 })
                 .collect();
             held_out(&trials)
@@ -76,14 +76,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Some(difference(&course.seen, &shown))
     }
 
-    /// Whether each sample of a trial counts and the joint does not rest at it.
-    fn moves_at(&self, trial: usize, joint: usize) -> Vec<bool> {
+    /// The samples of a trial over which the gap of a joint's torque is measured.
+    fn counted_of(&self, trial: usize, joint: usize) -> Vec<bool> {
         let course = &self.courses[trial];
-        let rests = |i: usize| course.at_rest.get(joint).is_some_and(|rest| rest[i]);
-        let counts = |i: usize| {
-            course.counted[i] && !rests(i) && !self.is_left_out(trial, i as f64 / course.rate)
-        };
-        (0..course.counted.len()).map(counts).collect()
+        let counts =
+            |i: usize| course.counted[i] && !self.is_left_out(trial, i as f64 / course.rate);
+        course.in_motion(joint, (0..course.counted.len()).map(counts).collect())
     }
 
     /// Whether an effect is of a kind of the passive base.
