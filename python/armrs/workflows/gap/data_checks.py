@@ -130,8 +130,7 @@ def refuted(dataset: Dataset, fitted: Model) -> list[str]:
 
 def _weight_moment(model: Model) -> float:
     """Return the first moment of mass of the stretched arm about its first joint [kg m]."""
-    before = np.concatenate([[0.0], np.cumsum([s.length for s in model.segments])[:-1]])
-    return float(sum(s.mass * (d + s.com) for s, d in zip(model.segments, before, strict=True)))
+    return float(np.sum(_armrs.Arm.from_model(model).first_moments))
 
 
 def _without_the_robot(dataset: Dataset, led: bool) -> list[str]:
