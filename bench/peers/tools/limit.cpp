@@ -156,27 +156,36 @@ template <int W> static inline double *write(const typename Wide<W>::R link[3], 
     return record;
 }
 
-// Semi-implicit Euler; `record` gets joint angles at 50 Hz, lanes side by side. The handle's path from a table, or computed in every step.
-template <int W> static void run(const Arm<typename Wide<W>::R> &arm, const double *starts, long steps, double duration, const double *table, double *record) {
+// Semi-implicit Euler in `substeps` steps from one sample at 50 Hz to the next; `record` gets joint angles, lanes side by side. The handle's
+// path from a table, every `every`-th point of which is that of a step, or computed in every step.
+template <int W>
+static inline void run_euler(const Arm<typename Wide<W>::R> &arm, const double *starts, long substeps, double duration, const double *table, long every, double *record) {
     typedef typename Wide<W>::R R;
+    const double h = RECORD * STEP / (double)substeps;
+    const long steps = substeps * lround(duration / (RECORD * STEP));
     R link[3], speed[3] = {};
     begin<W>(starts, link);
     for (long i = 0;; ++i) {
-        if (i % RECORD == 0) record = write<W>(link, record);
+        if (i % substeps == 0) record = write<W>(link, record);
         if (i == steps) return;
         double handle[2];
         if (table)
-            memcpy(handle, table + 2 * i, sizeof handle);
+            memcpy(handle, table + 2 * every * i, sizeof handle);
         else
-            own_handle_at((double)i * STEP, duration, handle);
+            own_handle_at((double)i * h, duration, handle);
         const Trig<R> t = trig<W>(link);
         R acceleration[3];
         closed(arm, t, link, speed, splat<R>(handle[0]), splat<R>(handle[1]), acceleration);
         for (int j = 0; j < 3; ++j) {
-            speed[j] += STEP * acceleration[j];
-            link[j] += STEP * speed[j];
+            speed[j] += h * acceleration[j];
+            link[j] += h * speed[j];
         }
     }
+}
+
+// The same with the step of W2 and W3.
+template <int W> static void run(const Arm<typename Wide<W>::R> &arm, const double *starts, double duration, const double *table, double *record) {
+    run_euler<W>(arm, starts, RECORD, duration, table, 1, record);
 }
 
 // The classical fourth-order method in `substeps` steps from one sample at 50 Hz to the next; the table is of half steps.
@@ -239,7 +248,11 @@ template <int W, class Run> static void batch(Run one, double *all) {
 }
 
 template <int W> static void batch_euler(double *all = NULL) {
-    batch<W>([](const auto &arm, const double *from, double *to) { run<W>(arm, from, SHORT_STEPS, SHORT, short_table, to); }, all);
+    batch<W>([](const auto &arm, const double *from, double *to) { run<W>(arm, from, SHORT, short_table, to); }, all);
+}
+
+template <int W> static void batch_fine(long substeps, const double *halves, double *all = NULL) {
+    batch<W>([=](const auto &arm, const double *from, double *to) { run_euler<W>(arm, from, substeps, SHORT, halves, 2, to); }, all);
 }
 
 template <int W> static void batch_fourth(long substeps, const double *table, double *all = NULL) {
@@ -291,7 +304,7 @@ static int accurate(int check, const char *word) {
     const size_t count = 3 * LONG_SAMPLES;
     long substeps;
     if (!strcmp(word, "accurate:euler:80")) {
-        ANSWER(check, run<1>(arm, starts, LONG_STEPS, LONG, NULL, long_record), long_record, count);
+        ANSWER(check, run<1>(arm, starts, LONG, NULL, long_record), long_record, count);
     } else if (sscanf(word, "accurate:rk4:%ld", &substeps) == 1) {
         ANSWER(check, run_fourth<1>(arm, starts, substeps, LONG, NULL, long_record), long_record, count);
     } else if (sscanf(word, "accurate:rk4_table:%ld", &substeps) == 1) {
@@ -300,6 +313,10 @@ static int accurate(int check, const char *word) {
         free(table);
     } else if (!strcmp(word, "batch:accurate:euler:80")) {
         answer_batch(check, [](double *to) { batch_euler<4>(to); });
+    } else if (sscanf(word, "batch:accurate:fine:%ld", &substeps) == 1) {
+        double *halves = half_table(substeps, SHORT);
+        answer_batch(check, [=](double *to) { batch_fine<4>(substeps, halves, to); });
+        free(halves);
     } else if (sscanf(word, "batch:accurate:rk4_scalar:%ld", &substeps) == 1) {
         answer_fourth<1>(check, substeps);
     } else if (sscanf(word, "batch:accurate:rk4_avx2:%ld", &substeps) == 1) {
@@ -404,13 +421,13 @@ int main(void) {
             SECONDS_OF(seconds, kernels<true>(arm));
             printf("{\"seconds\": %.9g}", seconds / STATES);
         } else if (!strcmp(word, "check:run")) {
-            run<1>(arm, starts, LONG_STEPS, LONG, NULL, long_record);
+            run<1>(arm, starts, LONG, NULL, long_record);
             print_values(long_record, 3 * LONG_SAMPLES);
         } else if (!strcmp(word, "run")) {
-            SECONDS_OF(seconds, run<1>(arm, starts, LONG_STEPS, LONG, NULL, long_record));
+            SECONDS_OF(seconds, run<1>(arm, starts, LONG, NULL, long_record));
             printf("{\"seconds\": %.9g}", seconds);
         } else if (!strcmp(word, "run:table")) {
-            SECONDS_OF(seconds, run<1>(arm, starts, LONG_STEPS, LONG, long_table, long_record));
+            SECONDS_OF(seconds, run<1>(arm, starts, LONG, long_table, long_record));
             printf("{\"seconds\": %.9g}", seconds);
         } else if (!strcmp(word, "check:batch")) {
             // The last group of runs; the end of each.

@@ -3,13 +3,15 @@
 //! The argument is the folder that `bench/peers/problem.py` has written.
 
 use arm_core::{
-    Chain, Joints, Lanes, Load, Plane, Pose, Scalar, forward_dynamics, inverse_dynamics,
+    Chain, Joints, Lanes, Load, Plane, Pose, Products, Scalar, accelerations, forward_dynamics,
+    inverse_dynamics,
 };
 use arm_core::{Segment, sample_arms as arms};
 use arm_ident::cascade::quasi_static::{Cascade, Stream};
 use arm_ident::regression::trial::Model;
 use arm_sim::{
-    Experiment, Integrator, sample_experiments, simulate, simulate_accurately, simulate_batch,
+    Columns, Experiment, Integrator, Start, sample_experiments, simulate, simulate_accurately,
+    simulate_batch,
 };
 use cpu_time::ProcessTime;
 use std::hint::black_box;
@@ -110,6 +112,8 @@ fn timed(seconds: f64) -> String {
 struct Peer {
     folder: std::path::PathBuf,
     arm: Chain<f64, 3>,
+    /// Its moments, which a loop computes once.
+    products: Products<f64, 3>,
     /// Angles, speeds, and accelerations or torques.
     states: Vec<[Joints<f64, 3>; 3]>,
 }
@@ -124,6 +128,7 @@ impl Peer {
         Self {
             folder: folder.to_owned(),
             arm: arms::human_arm(),
+            products: Products::of(&arms::human_arm()),
             states: (0..count).map(state).collect(),
         }
     }
@@ -144,11 +149,15 @@ impl Peer {
             ["inverse_dynamics"] => self.kernel(|s| self.inverse(s)),
             ["forward_dynamics"] => self.kernel(|s| self.forward(s)),
             ["inverse_dynamics", "lanes"] => {
-                self.lanes(|arm, [q, qd, qdd]| inverse_dynamics(arm, &Pose::new(q), qd, qdd))
+                let arm = self.arm.cast();
+                self.lanes(|[q, qd, qdd]| inverse_dynamics(&arm, &Pose::new(q), qd, qdd))
             }
-            ["forward_dynamics", "lanes"] => self.lanes(|arm, [q, qd, torque]| {
-                forward_dynamics(arm, &Pose::new(q), qd, &load(*torque))
-            }),
+            ["forward_dynamics", "lanes"] => {
+                let products = Products::of(&self.arm.cast());
+                self.lanes(|[q, qd, torque]| {
+                    accelerations(&products, &Pose::new(q), qd, &load(*torque))
+                })
+            }
             ["forward_dynamics", "joints", n] => match n {
                 "1" => joints::<1>(),
                 "2" => joints::<2>(),
@@ -163,6 +172,11 @@ impl Peer {
             ["run"] => self.run(euler, Some(0.02)),
             ["run", "ends"] => self.run(euler, Some(20.0)),
             ["run", "fourth"] => self.run(Integrator::Rk4, Some(0.02)),
+            ["run", "all"] => {
+                let mut experiment = run(euler, 20.0, Some(0.02));
+                experiment.columns = Columns::All;
+                seconds_of(|| simulate(black_box(&experiment)).expect("runs"))
+            }
             ["check", "batch"] => {
                 let done = simulate_batch(&batch(), 1);
                 let ends = done[done.len() - 4..].iter().flat_map(|r| {
@@ -174,6 +188,10 @@ impl Peer {
             ["check", "bits"] => bits().to_string(),
             ["batch"] => {
                 let runs = batch();
+                seconds_of(|| simulate_batch(black_box(&runs), 1))
+            }
+            ["batch", "all"] => {
+                let runs = batch_of(Columns::All);
                 seconds_of(|| simulate_batch(black_box(&runs), 1))
             }
             ["batch", "runs", n] => {
@@ -207,7 +225,7 @@ impl Peer {
     }
 
     fn forward(&self, [q, qd, torque]: &[Joints<f64, 3>; 3]) -> Joints<f64, 3> {
-        forward_dynamics(&self.arm, &Pose::new(q), qd, &load(*torque))
+        accelerations(&self.products, &Pose::new(q), qd, &load(*torque))
     }
 
     fn kernel<R>(&self, call: impl Fn(&[Joints<f64, 3>; 3]) -> R) -> String {
@@ -220,11 +238,7 @@ impl Peer {
     }
 
     /// Several states side by side; the time of one state.
-    fn lanes<R>(
-        &self,
-        call: impl Fn(&Chain<Lanes<8>, 3>, &[Joints<Lanes<8>, 3>; 3]) -> R,
-    ) -> String {
-        let arm = self.arm.cast::<Lanes<8>>();
+    fn lanes<R>(&self, call: impl Fn(&[Joints<Lanes<8>, 3>; 3]) -> R) -> String {
         let side_by_side = |group: &[[Joints<f64, 3>; 3]]| {
             [0, 1, 2].map(|part| {
                 Joints::from_fn(|j, _| Lanes(core::array::from_fn(|l| group[l][part][j])))
@@ -233,7 +247,7 @@ impl Peer {
         let groups: Vec<_> = self.states.chunks_exact(8).map(side_by_side).collect();
         let all = cpu_seconds(|| {
             for group in &groups {
-                black_box(call(&arm, black_box(group)));
+                black_box(call(black_box(group)));
             }
         });
         timed(all / (8 * groups.len()) as f64)
@@ -280,6 +294,19 @@ fn run(integrator: Integrator, duration: f64, interval: Option<f64>) -> Experime
         sample_experiments::human_experiment(duration, [0.0; 3]).expect("a sample experiment");
     experiment.integrator = integrator;
     experiment.output_interval = interval;
+    experiment.columns = Columns::Motion;
+    experiment
+}
+
+/// An experiment from the angles of its equilibrium, found before: as other tools start.
+fn from_its_equilibrium(mut experiment: Experiment<3>) -> Experiment<3> {
+    let mut short = experiment.clone();
+    short.duration = 0.02;
+    let found = simulate(&short).expect("runs").q;
+    experiment.start = Start::Given {
+        q: Joints::from_column_slice(&found[..3]),
+        qd: Joints::zeros(),
+    };
     experiment
 }
 
@@ -344,8 +371,16 @@ fn recorded(experiment: &Experiment<3>) -> String {
     json(&simulate(experiment).expect("runs").q)
 }
 
+/// The runs as other tools make them: from given angles, with angles and speeds recorded.
 fn batch() -> Vec<Experiment<3>> {
-    let base = run(Integrator::SemiImplicitEuler, 2.0, Some(0.02));
+    let runs = batch_of(Columns::Motion).into_iter();
+    runs.map(from_its_equilibrium).collect()
+}
+
+/// The runs, from equilibria that are found in them.
+fn batch_of(columns: Columns) -> Vec<Experiment<3>> {
+    let mut base = run(Integrator::SemiImplicitEuler, 2.0, Some(0.02));
+    base.columns = columns;
     let scaled = |i: u32| {
         let scale = 1.0 + 1e-4 * f64::from(i);
         let mut run = base.clone();

@@ -26,7 +26,7 @@ const LITTLE: f64 = 0.25;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
 /// Maximum number of further fits in [`PreparedSession::fit_on`], each from the end of the fit before.
-const ON: usize = 4;
+const CONTINUATIONS: usize = 4;
 /// Times that a fit is simulated anew from where it ended.
 const AGAIN: usize = 8;
 
@@ -205,7 +205,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         point: &LinearizationPoint<N>,
         mut fitted: FittedHypothesis<N>,
     ) -> FittedHypothesis<N> {
-        for _ in 0..ON {
+        for _ in 0..CONTINUATIONS {
             let on = self.fit_after_whole_step(point, &fitted);
             let Some(on) = on.filter(|on| on.cost < fitted.cost - fitted.enough()) else {
                 break;

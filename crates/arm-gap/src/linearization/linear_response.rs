@@ -12,7 +12,7 @@ use crate::hypothesis::Hypothesis;
 use crate::linearization::linearized_run::{ASTRAY, Linear};
 use crate::linearization::origin::Origin;
 use crate::linearization::plant::{Balance, Hand, Plant, balance, hands};
-use crate::measurement_model::joint_torques::beyond;
+use crate::measurement_model::joint_torques::multiset_difference;
 use crate::measurement_model::start::held_at_start;
 
 /// Response of the channels to one unit of a number, by group.
@@ -196,8 +196,8 @@ impl<const N: usize> Linear<'_, N> {
             return steps.map(one).collect();
         }
         // What the same effects resist with takes itself out.
-        let less = self.resisted(&beyond(&before.resisting, &plant.resisting));
-        let more = self.resisted(&beyond(&plant.resisting, &before.resisting));
+        let less = self.resisted(&multiset_difference(&before.resisting, &plant.resisting));
+        let more = self.resisted(&multiset_difference(&plant.resisting, &before.resisting));
         let push = |i: usize| less[i] - more[i];
         if same_rig {
             return steps.map(|i| (push(i), [0.0; 2])).collect();

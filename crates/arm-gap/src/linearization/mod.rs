@@ -3,8 +3,8 @@
 mod follower;
 pub mod linear_response;
 pub mod linearized_run;
+pub(crate) mod linearized_torques;
 mod newton;
 pub(crate) mod origin;
 mod plant;
 mod sliding;
-pub(crate) mod torques_beside;

@@ -137,8 +137,12 @@ impl<const N: usize> RigTorques<N> {
             return Ok(None);
         }
         let (own, other) = (own.effects(), other.effects());
-        let more = self.channels(&beyond(&other, &own), |i, torque| self.follow[i] * torque);
-        let less = self.channels(&beyond(&own, &other), |i, torque| self.follow[i] * torque);
+        let more = self.channels(&multiset_difference(&other, &own), |i, torque| {
+            self.follow[i] * torque
+        });
+        let less = self.channels(&multiset_difference(&own, &other), |i, torque| {
+            self.follow[i] * torque
+        });
         Ok(Some(difference(&more, &less)))
     }
 
@@ -167,7 +171,10 @@ impl<const N: usize> RigTorques<N> {
 }
 
 /// The effects of the first list that are not in the second; an effect that occurs twice counts twice.
-pub(crate) fn beyond(effects: &[Effect<f64>], others: &[Effect<f64>]) -> Vec<Effect<f64>> {
+pub(crate) fn multiset_difference(
+    effects: &[Effect<f64>],
+    others: &[Effect<f64>],
+) -> Vec<Effect<f64>> {
     let mut others = others.to_vec();
     let is_new = |effect: &&Effect<f64>| match others.iter().position(|o| o == *effect) {
         Some(same) => {
@@ -242,9 +249,15 @@ mod tests {
     fn of_two_lists_of_effects_what_both_have_counts_once_for_each() {
         let of = |size: f64| Effect::<f64>::new(Kind::Viscous, 1).with(&[size]);
         let (one, two, three) = (of(1.0), of(2.0), of(3.0));
-        assert_eq!(beyond(&[one, two, one], &[one, three]), [two, one]);
-        assert_eq!(beyond(&[one, three], &[one, two, one]), [three]);
-        assert!(beyond(&[two, one], &[one, two]).is_empty());
+        assert_eq!(
+            multiset_difference(&[one, two, one], &[one, three]),
+            [two, one]
+        );
+        assert_eq!(
+            multiset_difference(&[one, three], &[one, two, one]),
+            [three]
+        );
+        assert!(multiset_difference(&[two, one], &[one, two]).is_empty());
     }
 
     /// Circles of an arm that its contact moves, read by sensors with every fault that there is.

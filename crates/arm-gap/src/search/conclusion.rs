@@ -63,7 +63,11 @@ struct AmendedModel<const N: usize> {
 }
 
 /// A search whose names and laws of the passive base were compared with alternatives.
-type Judged<'a, const N: usize> = (SearchState<'a, N>, Vec<MissingEffect>, Vec<BaseLaw<N>>);
+struct Judged<'a, const N: usize> {
+    state: SearchState<'a, N>,
+    named: Vec<MissingEffect>,
+    base: Vec<BaseLaw<N>>,
+}
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Selects the laws of the passive base, and measures what is left.
@@ -74,8 +78,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         progress: Progress<'_>,
     ) -> Result<Finding<N>, GapError> {
         let judged = self.judged_with_base((state, named), apart.periodic, progress)?;
-        let ((state, mut named, base), withheld) =
-            self.without_open_names(judged, apart.periodic, progress)?;
+        let (judged, withheld) = self.without_open_names(judged, apart.periodic, progress)?;
+        let Judged {
+            state,
+            mut named,
+            base,
+        } = judged;
         let SearchState {
             mut calibrated,
             mut before,
@@ -132,27 +140,27 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Withholds the names of open joints; the joints that stay open without them.
     fn without_open_names(
         &mut self,
-        (mut state, mut named, mut base): Judged<'a, N>,
+        mut judged: Judged<'a, N>,
         periodic: Option<[f64; 2]>,
         progress: Progress<'_>,
     ) -> Result<(Judged<'a, N>, Vec<usize>), GapError> {
         let mut withheld = Vec::new();
         for _ in 0..WITHHOLDINGS {
-            let joints = self.withhold(&mut state)?;
+            let joints = self.withhold(&mut judged.state)?;
             if joints.is_empty() {
                 break;
             }
             withheld.extend(joints);
-            (state, named) = self.judged(state, periodic, progress)?;
-            (state, named, base) = self.judged_with_base((state, named), periodic, progress)?;
+            let again = self.judged(judged.state, periodic, progress)?;
+            judged = self.judged_with_base(again, periodic, progress)?;
         }
         if !withheld.is_empty() {
-            let open = self.open_joints(&state.current.hypothesis);
+            let open = self.open_joints(&judged.state.current.hypothesis);
             withheld.retain(|&joint| open[joint]);
             withheld.sort_unstable();
             withheld.dedup();
         }
-        Ok(((state, named, base), withheld))
+        Ok((judged, withheld))
     }
 
     /// Selects the laws of the base, and tests the other named effects again where the base changes: a named spring over two joints brings
@@ -188,7 +196,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         if !is_as_judged(&found, &(state.current.asked.clone(), self.dropped.clone())) {
             (state, named) = self.judged(state, periodic, progress)?;
         }
-        Ok((state, named, base))
+        Ok(Judged { state, named, base })
     }
 
     /// What is known of the amended model, with the noise of all fitted trials where there are repeats. A name that comes to nothing then is

@@ -13,8 +13,8 @@ use crate::data::session::ComparisonMode;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::linearization::linear_response::{Change, Response};
 use crate::linearization::linearized_run::{ASTRAY, Linear};
+use crate::linearization::linearized_torques::LinearizedTorques;
 use crate::linearization::origin::Origin;
-use crate::linearization::torques_beside::TorquesBeside;
 use crate::prepared_session::{PreparedSession, SimulatedRuns};
 use crate::sensitivity::rows::WhitenedRows;
 
@@ -276,7 +276,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             ComparisonMode::Led => Vec::new(),
             ComparisonMode::Torque => self.parallel(groups, |group| {
                 let course = &self.courses[self.references[group]];
-                TorquesBeside::of(self.session, hypothesis, course)
+                LinearizedTorques::of(self.session, hypothesis, course)
             }),
         };
         let one = |job: usize| {

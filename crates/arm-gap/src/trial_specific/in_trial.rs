@@ -16,7 +16,7 @@ use crate::data::session::{ComparisonMode, FURTHEST, Session};
 use crate::hypothesis::{Hypothesis, Target};
 use crate::linearization::linear_response::Change;
 use crate::linearization::linearized_run::Linear;
-use crate::linearization::torques_beside::TorquesBeside;
+use crate::linearization::linearized_torques::LinearizedTorques;
 use crate::prepared_session::PreparedSession;
 use crate::sensitivity::normal_equations::solve;
 use crate::trial_specific::component::{SLOW, shapes_of};
@@ -122,7 +122,7 @@ struct ShownTrial<'a, const N: usize> {
 /// Reference for responses: a simulated run if a robot leads the arm, otherwise the torques of the measured motion.
 enum Beside<'a, const N: usize> {
     Run(Box<Linear<'a, N>>),
-    Torques(Box<TorquesBeside<'a, N>>),
+    Torques(Box<LinearizedTorques<'a, N>>),
 }
 
 impl<'a, const N: usize> ShownTrial<'a, N> {
@@ -135,9 +135,9 @@ impl<'a, const N: usize> ShownTrial<'a, N> {
             ComparisonMode::Led => {
                 Beside::Run(Box::new(Linear::along(session, hypothesis, course)?))
             }
-            ComparisonMode::Torque => {
-                Beside::Torques(Box::new(TorquesBeside::of(session, hypothesis, course)?))
-            }
+            ComparisonMode::Torque => Beside::Torques(Box::new(LinearizedTorques::of(
+                session, hypothesis, course,
+            )?)),
         };
         let shown = match &beside {
             Beside::Run(line) => line.shown()?,

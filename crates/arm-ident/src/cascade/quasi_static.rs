@@ -18,8 +18,8 @@ use arm_numerics::least_squares::condense::{BLOCK, Column, Condenser};
 use arm_numerics::least_squares::factor::Factor;
 use arm_numerics::linalg::matrix::{Matrix, add_scaled, dot};
 
-/// Samples that are computed with together.
-const WIDTH: usize = 4;
+/// Samples that are computed with together: two registers of AVX-512, whose operations need not wait for each other.
+const WIDTH: usize = 16;
 
 /// Folds samples as they come. Memory is fixed when it is made; pushing never allocates.
 #[derive(Clone, Debug)]

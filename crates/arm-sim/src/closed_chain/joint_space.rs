@@ -129,12 +129,58 @@ pub(crate) fn add_inertia<T: Scalar, const N: usize>(
 /// `B`, `C q̇ + G` and the Jacobian of the tip at one state, with a moving base and a handle beside the tip where there are.
 pub(crate) struct JointSpaceEquation<T, const N: usize> {
     inertia: JointMatrix<T, N>,
-    /// `C q̇ + G` \[N m\].
-    pub bias: Joints<T, N>,
-    /// Rows y and z \[m/rad\].
-    pub jacobian: [[T; N]; 2],
+    /// What does not depend on accelerations.
+    pub given: BiasAndJacobian<T, N>,
     /// `J̇ q̇` \[m/s²\].
     pub jacobian_rate: Plane<T>,
+}
+
+/// What of the equation does not depend on accelerations.
+pub(crate) struct BiasAndJacobian<T, const N: usize> {
+    /// `C q̇ + G` \[N m\].
+    pub bias: Joints<T, N>,
+    /// Rows y and z of the Jacobian of the tip \[m/rad\].
+    jacobian: [[T; N]; 2],
+}
+
+impl<T: Scalar, const N: usize> BiasAndJacobian<T, N> {
+    pub fn new(
+        chain: &Chain<T, N>,
+        base: Option<&MovingBase<T>>,
+        placement: Option<&Placement<T>>,
+        (pose, qd): (&Pose<T, N>, &Joints<T, N>),
+    ) -> Self {
+        let still = Joints::<T, N>::repeat(T::ZERO);
+        let j = jacobian(chain, pose);
+        let mut given = Self {
+            bias: inverse_dynamics(chain, pose, qd, &still),
+            jacobian: [0, 1].map(|row| from_fn(|k| j[(row, k)])),
+        };
+        if let Some(base) = base {
+            let [uy, uz] = base.per_angle;
+            let [fy, fz] = joint_force(chain, pose, (qd, &still), [T::ZERO; 2])[0];
+            given.bias[0] += uy * fy + uz * fz;
+            given.jacobian[0][0] += uy;
+            given.jacobian[1][0] += uz;
+        }
+        if let Some(placement) = placement {
+            let [y, z] = placement.arm(pose);
+            for k in 0..N {
+                given.jacobian[0][k] += -z;
+                given.jacobian[1][k] += y;
+            }
+        }
+        given
+    }
+
+    /// `Jᵀ F` \[N m\].
+    pub fn tip_torque(&self, force: Plane<T>) -> Joints<T, N> {
+        let mut torque = Joints::<T, N>::repeat(T::ZERO);
+        for k in 0..N {
+            torque[k] = self.jacobian[0][k] * force[0] + self.jacobian[1][k] * force[1];
+        }
+        torque
+    }
 }
 
 impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
@@ -144,12 +190,10 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
         placement: Option<&Placement<T>>,
         (pose, qd): (&Pose<T, N>, &Joints<T, N>),
     ) -> Self {
-        let still = Joints::<T, N>::repeat(T::ZERO);
-        let (j, rate) = (jacobian(chain, pose), jacobian_rate(chain, pose, qd));
+        let rate = jacobian_rate(chain, pose, qd);
         let mut terms = Self {
             inertia: inertia(chain, pose),
-            bias: inverse_dynamics(chain, pose, qd, &still),
-            jacobian: [0, 1].map(|row| from_fn(|k| j[(row, k)])),
+            given: BiasAndJacobian::new(chain, base, placement, (pose, qd)),
             jacobian_rate: [0, 1].map(|row| {
                 let mut sum = T::ZERO;
                 for k in 0..N {
@@ -167,17 +211,9 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
                 terms.inertia[(k, 0)] += coupling;
             }
             terms.inertia[(0, 0)] += base.mass * (uy.squared() + uz.squared());
-            let [fy, fz] = joint_force(chain, pose, (qd, &still), [T::ZERO; 2])[0];
-            terms.bias[0] += uy * fy + uz * fz;
-            terms.jacobian[0][0] += uy;
-            terms.jacobian[1][0] += uz;
         }
         if let Some(placement) = placement {
-            let ([y, z], turning) = (placement.arm(pose), placement.centripetal(pose, qd));
-            for k in 0..N {
-                terms.jacobian[0][k] += -z;
-                terms.jacobian[1][k] += y;
-            }
+            let turning = placement.centripetal(pose, qd);
             for axis in 0..2 {
                 terms.jacobian_rate[axis] += turning[axis];
             }
@@ -193,7 +229,7 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
                 self.inertia[(k, joint)] = T::ZERO;
             }
             self.inertia[(joint, joint)] = T::ONE;
-            for row in &mut self.jacobian {
+            for row in &mut self.given.jacobian {
                 row[joint] = T::ZERO;
             }
         }
@@ -202,7 +238,7 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
 
     /// `J v` \[m/s for speeds\].
     pub fn tip_rate(&self, v: &Joints<T, N>) -> Plane<T> {
-        self.jacobian.map(|row| {
+        self.given.jacobian.map(|row| {
             let mut sum = T::ZERO;
             for k in 0..N {
                 sum += row[k] * v[k];
@@ -213,11 +249,7 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
 
     /// `Jᵀ F` \[N m\].
     pub fn tip_torque(&self, force: Plane<T>) -> Joints<T, N> {
-        let mut torque = Joints::<T, N>::repeat(T::ZERO);
-        for k in 0..N {
-            torque[k] = self.jacobian[0][k] * force[0] + self.jacobian[1][k] * force[1];
-        }
-        torque
+        self.given.tip_torque(force)
     }
 
     /// `B⁻¹ τ` \[rad/s²\], by a square-root-free Cholesky factorisation.
@@ -254,7 +286,7 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
 
     /// `B⁻¹ Jᵀ (J B⁻¹ Jᵀ)⁻¹`: how the joints follow the tip with the least energy of motion, and the force for it.
     pub fn constraint(&self) -> Constraint<T, N> {
-        let mut follow = self.jacobian.map(Joints::<T, N>::from);
+        let mut follow = self.given.jacobian.map(Joints::<T, N>::from);
         self.solve(&mut follow);
         let entry = |row: usize, column: usize| self.tip_rate(&follow[column])[row];
         let (a, b, d) = (entry(0, 0), entry(0, 1), entry(1, 1));

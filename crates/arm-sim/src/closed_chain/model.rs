@@ -10,7 +10,7 @@ use arm_core::{
 
 use crate::closed_chain::branch_free::{BranchFree, affine, contact_gap, load, pull};
 use crate::closed_chain::joint_space::{
-    JointSpaceEquation, MovingBase, add_inertia, first_moment_rows,
+    BiasAndJacobian, JointSpaceEquation, MovingBase, add_inertia, first_moment_rows,
 };
 use crate::closed_chain::state::{Input, Outcome, State, difference, powers, sum};
 
@@ -447,7 +447,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         force: Plane<T>,
         terms: &JointSpaceEquation<T, N>,
     ) -> (Joints<T, N>, Plane<T>) {
-        let net = difference(torque, &terms.bias);
+        let net = difference(torque, &terms.given.bias);
         if !matches!(self.link, Link::Rigid) {
             return (
                 terms.accelerate(&sum(&net, &terms.tip_torque(force))),
@@ -490,6 +490,12 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let constraint = terms.constraint();
         let force = constraint.force([wanted[0] - v[0], wanted[1] - v[1]]);
         state.qd = sum(&state.qd, &constraint.response(force));
+    }
+
+    /// Bias and Jacobian of the arm at rest.
+    pub fn bias_and_jacobian_at_rest(&self, pose: &Pose<T, N>) -> BiasAndJacobian<T, N> {
+        let at = (pose, &Joints::repeat(T::ZERO));
+        BiasAndJacobian::new(&self.chain, self.base.as_ref(), self.placement.as_ref(), at)
     }
 
     /// The equation of motion in joint coordinates.

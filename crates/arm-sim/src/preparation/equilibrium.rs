@@ -20,10 +20,18 @@ const SMALL: f64 = 1e-6;
 /// Stiffness that is rounding, in units of the largest.
 const ROUNDING: f64 = 1e-7;
 
+/// Most unknowns: six joints, and the force of a rigid coupling.
+pub(crate) const MOST: usize = 8;
+/// Angles of the joints and the force of a constraint, or what is left of them; zero where there are fewer. In arrays, since reserving memory
+/// would take longer than the rest.
+pub(crate) type Values = [f64; MOST];
+
 /// What is sought: `residual(x) = 0`.
-pub(crate) struct Balance<'a> {
+pub(crate) struct Balance<'a, R> {
     /// Torques left at angles and the forces of a constraint, and behind them what the constraint leaves.
-    pub residual: &'a dyn Fn(&[f64]) -> Vec<f64>,
+    pub residual: R,
+    /// Number of unknowns.
+    pub unknowns: usize,
     /// By joint, whether it is held where it is.
     pub held: &'a [bool],
     /// Size of a residual.
@@ -32,17 +40,17 @@ pub(crate) struct Balance<'a> {
     pub enough: f64,
 }
 
-impl Balance<'_> {
+impl<R: Fn(&Values) -> Values> Balance<'_, R> {
     /// The angles at which the arm comes to rest from those it starts from, and the forces of a constraint there.
     ///
     /// # Errors
     /// [`SimulationError::NoEquilibrium`] with the reason.
-    pub fn settle(&self, mut x: Vec<f64>) -> Result<Vec<f64>, SimulationError> {
-        let from = x.clone();
+    pub fn settle(&self, mut x: Values) -> Result<Values, SimulationError> {
+        let from = x;
         let mut r = (self.residual)(&x);
         for iterations in 0..ITERATIONS {
             let slopes = Slopes::at(self, &x);
-            if (self.size)(&r) < self.enough {
+            if self.size(&r) < self.enough {
                 return if slopes.definite(ROUNDING * slopes.scale) {
                     Ok(x)
                 } else {
@@ -50,7 +58,7 @@ impl Balance<'_> {
                 };
             }
             let unbalanced = NoRest::Unbalanced {
-                residual: (self.size)(&r),
+                residual: self.size(&r),
                 iterations,
             };
             (x, r) = self.step(&slopes, &x, &r).ok_or(unbalanced)?;
@@ -59,7 +67,7 @@ impl Balance<'_> {
                 return Err(NoRest::FallsAway { joint }.into());
             }
         }
-        let residual = (self.size)(&r);
+        let residual = self.size(&r);
         let iterations = ITERATIONS;
         Err(NoRest::Unbalanced {
             residual,
@@ -68,13 +76,16 @@ impl Balance<'_> {
         .into())
     }
 
+    fn size(&self, r: &Values) -> f64 {
+        (self.size)(&r[..self.unknowns])
+    }
+
     /// The angles after a step, and what is left there; nothing where no step helps.
-    fn step(&self, slopes: &Slopes, x: &[f64], r: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+    fn step(&self, slopes: &Slopes, x: &Values, r: &Values) -> Option<(Values, Values)> {
         let joints = self.held.len();
-        let along = |step: &[f64], share: f64| {
-            let tried: Vec<f64> = x.iter().zip(step).map(|(x, s)| x - share * s).collect();
-            let left = (self.residual)(&tried);
-            (tried, left)
+        let along = |step: &Values, share: f64| {
+            let tried = core::array::from_fn(|i| x[i] - share * step[i]);
+            (tried, (self.residual)(&tried))
         };
         let length = |step: &[f64]| step[..joints].iter().fold(0.0, |m: f64, s| m.max(s.abs()));
         let most =
@@ -86,7 +97,7 @@ impl Balance<'_> {
             let mut share = 1.0;
             while share > 1e-6 {
                 let (tried, left) = along(&step, share);
-                if (self.size)(&left) < (self.size)(r) {
+                if self.size(&left) < self.size(r) {
                     return Some((tried, left));
                 }
                 share *= 0.5;
@@ -98,7 +109,7 @@ impl Balance<'_> {
             damping *= 2.0;
             if slopes.definite(0.5 * damping) {
                 step = slopes.solve(damping, r);
-                if step.as_deref().is_some_and(|step| length(step) <= LONGEST) {
+                if step.as_ref().is_some_and(|step| length(step) <= LONGEST) {
                     break;
                 }
             }
@@ -112,9 +123,10 @@ impl Balance<'_> {
 /// Derivatives of a residual.
 struct Slopes {
     /// By row of the residual.
-    rows: Vec<Vec<f64>>,
-    /// Joints that are not held.
-    free: Vec<usize>,
+    rows: [Values; MOST],
+    unknowns: usize,
+    /// By joint, whether it is not held.
+    free: [bool; MOST],
     joints: usize,
     /// Largest stiffness \[N m/rad\]; 1 where there is none.
     scale: f64,
@@ -122,57 +134,74 @@ struct Slopes {
 
 impl Slopes {
     /// By central differences.
-    fn at(balance: &Balance, x: &[f64]) -> Self {
-        let (n, joints) = (x.len(), balance.held.len());
-        let mut rows = vec![vec![0.0; n]; n];
-        for k in 0..n {
+    fn at<R: Fn(&Values) -> Values>(balance: &Balance<R>, x: &Values) -> Self {
+        let (unknowns, joints) = (balance.unknowns, balance.held.len());
+        let mut rows = [[0.0; MOST]; MOST];
+        for k in 0..unknowns {
             let shifted = |by: f64| {
-                let mut x = x.to_vec();
+                let mut x = *x;
                 x[k] += by;
                 (balance.residual)(&x)
             };
             let (more, less) = (shifted(SMALL), shifted(-SMALL));
-            for (i, row) in rows.iter_mut().enumerate() {
+            for (i, row) in rows[..unknowns].iter_mut().enumerate() {
                 row[k] = (more[i] - less[i]) / (2.0 * SMALL);
             }
         }
-        let free: Vec<usize> = (0..joints).filter(|&j| !balance.held[j]).collect();
-        let stiffness = |&i: &usize| free.iter().fold(0.0, |m: f64, &k| m.max(rows[i][k].abs()));
-        let largest = free.iter().map(stiffness).fold(0.0, f64::max);
-        let scale = if largest > 0.0 { largest } else { 1.0 };
-        Self {
+        let mut free = [false; MOST];
+        for (free, held) in free.iter_mut().zip(balance.held) {
+            *free = !held;
+        }
+        let mut slopes = Self {
             rows,
+            unknowns,
             free,
             joints,
-            scale,
+            scale: 1.0,
+        };
+        let pairs = slopes
+            .free()
+            .flat_map(|i| slopes.free().map(move |k| (i, k)));
+        let largest = pairs.fold(0.0, |m: f64, (i, k)| m.max(rows[i][k].abs()));
+        if largest > 0.0 {
+            slopes.scale = largest;
         }
+        slopes
+    }
+
+    /// The joints that are not held.
+    fn free(&self) -> impl Iterator<Item = usize> {
+        let free = self.free;
+        (0..self.joints).filter(move |&j| free[j])
     }
 
     /// Whether the stiffness of the free joints and a damping is positive definite, within a constraint: Cholesky's
     /// factors are real. Across a constraint it is made so by a large multiple (Debreu 1952).
     fn definite(&self, damping: f64) -> bool {
-        let n = self.free.len();
-        // By rows, in one piece: this is called often, and reserving memory takes longer than the rest.
-        let mut a = vec![0.0; n * n];
-        for (i, &p) in self.free.iter().enumerate() {
-            for (k, &q) in self.free.iter().enumerate() {
-                a[n * i + k] = 0.5 * (self.rows[p][q] + self.rows[q][p]);
-                for constraint in &self.rows[self.joints..] {
+        let mut a = [[0.0; MOST]; MOST];
+        let n = self.free().count();
+        for (row, p) in a.iter_mut().zip(self.free()) {
+            for (entry, q) in row.iter_mut().zip(self.free()) {
+                *entry = 0.5 * (self.rows[p][q] + self.rows[q][p]);
+                for constraint in &self.rows[self.joints..self.unknowns] {
                     let square: f64 = constraint[..self.joints].iter().map(|g| g * g).sum();
-                    a[n * i + k] += self.scale / ROUNDING * constraint[p] * constraint[q] / square;
+                    *entry += self.scale / ROUNDING * constraint[p] * constraint[q] / square;
                 }
             }
-            a[n * i + i] += damping;
+        }
+        for (i, row) in a[..n].iter_mut().enumerate() {
+            row[i] += damping;
         }
         for k in 0..n {
+            let above = a[k];
             // NaN is not positive.
-            if a[n * k + k].partial_cmp(&0.0) != Some(core::cmp::Ordering::Greater) {
+            if above[k].partial_cmp(&0.0) != Some(core::cmp::Ordering::Greater) {
                 return false;
             }
-            for i in k + 1..n {
-                let factor = a[n * i + k] / a[n * k + k];
+            for row in &mut a[k + 1..n] {
+                let factor = row[k] / above[k];
                 for j in k + 1..n {
-                    a[n * i + j] -= factor * a[n * k + j];
+                    row[j] -= factor * above[j];
                 }
             }
         }
@@ -180,37 +209,31 @@ impl Slopes {
     }
 
     /// Solution of `(∂r/∂x + damping of the joints) s = r` by Gaussian elimination; nothing where it is singular.
-    fn solve(&self, damping: f64, r: &[f64]) -> Option<Vec<f64>> {
-        let n = r.len();
-        let width = n + 1;
-        let mut rows: Vec<f64> = Vec::with_capacity(n * width);
-        for (row, r) in self.rows.iter().zip(r) {
-            rows.extend(row.iter().chain([r]));
-        }
-        for i in 0..self.joints {
-            rows[width * i + i] += damping;
+    fn solve(&self, damping: f64, r: &Values) -> Option<Values> {
+        let n = self.unknowns;
+        let (mut rows, mut known) = (self.rows, *r);
+        for (i, row) in rows[..self.joints].iter_mut().enumerate() {
+            row[i] += damping;
         }
         for k in 0..n {
-            let size = |row: usize| f64::abs(rows[width * row + k]);
+            let size = |row: usize| f64::abs(rows[row][k]);
             let pivot = (k..n).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
-            for c in 0..width {
-                rows.swap(width * k + c, width * pivot + c);
-            }
-            let (above, below) = rows.split_at_mut(width * (k + 1));
-            let head = &above[width * k..];
-            for row in below.chunks_exact_mut(width) {
-                let factor = row[k] / head[k];
-                for (value, above) in row.iter_mut().zip(head).skip(k) {
-                    *value -= factor * above;
+            rows.swap(k, pivot);
+            known.swap(k, pivot);
+            let head = rows[k];
+            for i in k + 1..n {
+                let factor = rows[i][k] / head[k];
+                for c in k..n {
+                    rows[i][c] -= factor * head[c];
                 }
+                known[i] -= factor * known[k];
             }
         }
-        let mut step = vec![0.0; n];
+        let mut step = [0.0; MOST];
         for k in (0..n).rev() {
-            let row = &rows[width * k..];
-            let known: f64 = (k + 1..n).map(|c| row[c] * step[c]).sum();
-            step[k] = (row[n] - known) / row[k];
+            let sum: f64 = (k + 1..n).map(|c| rows[k][c] * step[c]).sum();
+            step[k] = (known[k] - sum) / rows[k][k];
         }
-        step.iter().all(|s| s.is_finite()).then_some(step)
+        step[..n].iter().all(|s| s.is_finite()).then_some(step)
     }
 }

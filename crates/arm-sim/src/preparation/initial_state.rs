@@ -7,7 +7,7 @@ use crate::SimulationError;
 use crate::closed_chain::model::{Link, Model};
 use crate::closed_chain::state::{Input, State};
 use crate::error::{NoRest, finite};
-use crate::preparation::equilibrium::Balance;
+use crate::preparation::equilibrium::{Balance, MOST, Values};
 
 /// Largest torque left in an equilibrium, and largest gap of a rigid coupling \[N m, m\].
 const BALANCED: f64 = 1e-9;
@@ -32,7 +32,7 @@ pub(crate) fn given<const N: usize>(
     };
     if matches!(model.link, Link::Rigid) {
         model.project(input, &mut state, (ITERATIONS, &[false; N]));
-        let [y, z] = gap(model, input, &state.q);
+        let [y, z] = gap(model, input, (&state.q, &Pose::new(&state.q)));
         let gap = libm::hypot(y, z);
         // Not a number counts as apart.
         if !matches!(gap.partial_cmp(&BALANCED), Some(core::cmp::Ordering::Less)) {
@@ -97,7 +97,7 @@ fn nearest<const N: usize>(
             return Ok(q);
         }
     }
-    let angles = |x: Vec<f64>| Joints::from_fn(|i, _| x[i]);
+    let angles = |x: Values| Joints::from_fn(|i, _| x[i]);
     let found = settled(model, input, (near, &[Friction::Shaken; N])).map(angles);
     if found.is_ok() {
         return found;
@@ -165,7 +165,7 @@ pub(crate) fn following<const N: usize>(
 fn beyond_friction<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
-    (x, friction): (&[f64], &[Friction; N]),
+    (x, friction): (&Values, &[Friction; N]),
 ) -> Vec<(usize, f64)> {
     if !friction.contains(&Friction::Holds) {
         return Vec::new();
@@ -181,11 +181,12 @@ fn beyond_friction<const N: usize>(
 fn most_friction<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
-    x: &[f64],
+    x: &Values,
 ) -> [f64; N] {
     let (q, rest) = (Joints::from_fn(|i, _| x[i]), Joints::<f64, N>::zeros());
-    let force = force(model, input, x);
-    let through = model.through_joints(&Pose::new(&q), (&rest, &rest), (force, input));
+    let pose = Pose::new(&q);
+    let force = force(model, input, (x, &q, &pose));
+    let through = model.through_joints(&pose, (&rest, &rest), (force, input));
     let motion = input.motion(&q, &rest).with_joint_force(&through);
     dry_friction(&model.effects, &motion, &[])
 }
@@ -198,7 +199,7 @@ fn settled<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     (near, friction): (&Joints<f64, N>, &[Friction; N]),
-) -> Result<Vec<f64>, SimulationError> {
+) -> Result<Values, SimulationError> {
     let found = balanced(model, input, (near, friction));
     let Link::Compliant(contact) = &model.link else {
         return found;
@@ -217,10 +218,11 @@ fn settled<const N: usize>(
     closed.link = Link::Compliant(tight);
     let x = balanced(&closed, input, (near, friction))?;
     let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
-    let stretch = gap(model, input, &q);
+    let pose = Pose::new(&q);
+    let stretch = gap(model, input, (&q, &pose));
     let back = [0, 1].map(|axis| -play[axis].copysign(stretch[axis]));
     // The smallest change of the angles that moves the tip so.
-    let terms = model.terms(&Pose::new(&q), &Joints::zeros());
+    let terms = model.terms(&pose, &Joints::zeros());
     let [along_y, along_z] = [[1.0, 0.0], [0.0, 1.0]].map(|unit| terms.tip_torque(unit));
     let (yy, yz, zz) = (
         along_y.dot(&along_y),
@@ -247,20 +249,20 @@ fn balanced<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
     (near, friction): (&Joints<f64, N>, &[Friction; N]),
-) -> Result<Vec<f64>, SimulationError> {
+) -> Result<Values, SimulationError> {
+    const { assert!(N + 2 <= MOST) };
     let held = &friction.map(|f| f == Friction::Holds);
-    let mut x: Vec<f64> = near.iter().copied().collect();
-    if matches!(model.link, Link::Rigid) {
-        x.extend([0.0; 2]);
-    }
+    let mut start = [0.0; MOST];
+    start[..N].copy_from_slice(near.as_slice());
     let stiffest = match &model.link {
         Link::Compliant(contact) => contact.stiffness[0].max(contact.stiffness[1]),
         Link::Free | Link::Forced(_) | Link::Rigid => 0.0,
     };
-    let residual = |x: &[f64]| {
+    let is_rigid = matches!(model.link, Link::Rigid);
+    let slides = friction.iter().any(|f| matches!(f, Friction::Slides(_)));
+    let residual = |x: &Values| {
         let mut r = imbalance(model, input, x);
-        let slides = |f: &Friction| matches!(f, Friction::Slides(_));
-        let most = match friction.iter().any(slides) {
+        let most = match slides {
             true => most_friction(model, input, x),
             false => [0.0; N],
         };
@@ -274,7 +276,7 @@ fn balanced<const N: usize>(
         r
     };
     // A torque counts by the angle that it turns a joint by, where that is more than 1 rad/(N m): an arm may be light.
-    let unit = stiffness(&residual, &x, N).min(1.0);
+    let unit = stiffness(&residual, &start, N).min(1.0);
     let size = |r: &[f64]| {
         let sizes = r.iter().enumerate().map(|(i, v)| {
             let torque = i < N && !held[i];
@@ -283,23 +285,24 @@ fn balanced<const N: usize>(
         sizes.fold(0.0, |m: f64, v| if v <= m { m } else { v })
     };
     let balance = Balance {
-        residual: &residual,
+        residual,
+        unknowns: if is_rigid { N + 2 } else { N },
         held,
         size: &size,
         // A stiff contact turns the rounding of a position into a force.
         enough: BALANCED + 1e-15 * stiffest / unit,
     };
-    balance.settle(x)
+    balance.settle(start)
 }
 
 /// Largest change of a torque with an angle \[N m/rad\]; 1 where none changes.
-fn stiffness(residual: &impl Fn(&[f64]) -> Vec<f64>, x: &[f64], joints: usize) -> f64 {
+fn stiffness(residual: &impl Fn(&Values) -> Values, x: &Values, joints: usize) -> f64 {
     /// Step of the difference quotient \[rad\].
     const SMALL: f64 = 1e-6;
     let here = residual(x);
     let mut largest: f64 = 0.0;
     for k in 0..joints {
-        let mut beside = x.to_vec();
+        let mut beside = *x;
         beside[k] += SMALL;
         for (there, here) in residual(&beside).iter().zip(&here).take(joints) {
             largest = largest.max((there - here).abs() / SMALL);
@@ -308,32 +311,36 @@ fn stiffness(residual: &impl Fn(&[f64]) -> Vec<f64>, x: &[f64], joints: usize) -
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-/// Force on the arm at rest \[N\]; for a rigid coupling the last two of `x`.
-fn force<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[f64]) -> [f64; 2] {
-    let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
-    match (&model.link, x.get(N..)) {
-        (Link::Compliant(contact), _) => contact.force_on_arm(gap(model, input, &q), [0.0; 2]),
-        (Link::Forced(force), _) => *force,
-        (Link::Rigid, Some(&[y, z])) => [y, z],
-        _ => [0.0; 2],
+/// Force on the arm at rest \[N\]; for a rigid coupling the unknowns behind the angles.
+fn force<const N: usize>(
+    model: &Model<f64, N>,
+    input: &Input<f64, N>,
+    (x, q, pose): (&Values, &Joints<f64, N>, &Pose<f64, N>),
+) -> [f64; 2] {
+    match &model.link {
+        Link::Compliant(contact) => contact.force_on_arm(gap(model, input, (q, pose)), [0.0; 2]),
+        Link::Forced(force) => *force,
+        Link::Rigid => [x[N], x[N + 1]],
+        Link::Free => [0.0; 2],
     }
 }
 
-/// Left-hand side less right-hand side at rest; for a rigid coupling the last two of `x` are the force on the arm.
-fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[f64]) -> Vec<f64> {
+/// Left-hand side less right-hand side at rest; for a rigid coupling the unknowns behind the angles are the force on the arm.
+fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &Values) -> Values {
     let q = Joints::<f64, N>::from_fn(|i, _| x[i]);
     let rest = Joints::<f64, N>::zeros();
     let pose = Pose::new(&q);
     let resisting = model.resisting(&input.motion(&q, &rest), &[]);
-    let force = force(model, input, x);
-    let terms = model.terms(&pose, &rest);
-    let held = terms.tip_torque(force);
+    let force = force(model, input, (x, &q, &pose));
+    let given = model.bias_and_jacobian_at_rest(&pose);
+    let held = given.tip_torque(force);
     let driving = model.driving(input, &pose);
-    let mut r: Vec<f64> = (0..N)
-        .map(|i| terms.bias[i] + resisting[i] - driving[i] - held[i])
-        .collect();
+    let mut r = [0.0; MOST];
+    for i in 0..N {
+        r[i] = given.bias[i] + resisting[i] - driving[i] - held[i];
+    }
     if matches!(model.link, Link::Rigid) {
-        r.extend(gap(model, input, &q));
+        [r[N], r[N + 1]] = gap(model, input, (&q, &pose));
     }
     r
 }
@@ -341,9 +348,9 @@ fn imbalance<const N: usize>(model: &Model<f64, N>, input: &Input<f64, N>, x: &[
 fn gap<const N: usize>(
     model: &Model<f64, N>,
     input: &Input<f64, N>,
-    q: &Joints<f64, N>,
+    (q, pose): (&Joints<f64, N>, &Pose<f64, N>),
 ) -> [f64; 2] {
-    let at = model.tip(q, &Pose::new(q));
+    let at = model.tip(q, pose);
     let handle = input.handle.position;
     [handle[0] - at[0], handle[1] - at[1]]
 }

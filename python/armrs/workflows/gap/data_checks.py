@@ -35,7 +35,7 @@ _STARTING = 0.02
 """Time between the samples from which the speed of the robot at the start of a trial is computed [s]."""
 _AT_REST = 0.05
 """Speed of a robot's joint up to which it counts as resting [rad/s]: four samples of an encoder of 0.1 mrad give it to 0.02."""
-_MOVED = 1.0
+_CONFIRMING_CHANGE = 1.0
 """Change of the weight that a fit must confirm for another weight to be reported, in units of the stated `segment_uncertainty`."""
 _FIRST = 16
 """Samples at the start that are compared first to find copies: no trial has fewer."""
@@ -125,7 +125,7 @@ def refuted(dataset: Dataset, fitted: Model) -> list[str]:
         return []
     moved = _weight_moment(fitted) / _weight_moment(dataset.model) - 1.0
     towards = moved if found.factor > 1.0 else -moved
-    return [] if towards >= _MOVED * dataset.model.segment_uncertainty else [str(found)]
+    return [] if towards >= _CONFIRMING_CHANGE * dataset.model.segment_uncertainty else [str(found)]
 
 
 def _weight_moment(model: Model) -> float:

@@ -10,7 +10,7 @@ use crate::linearization::linearized_run::ASTRAY;
 use crate::measurement_model::joint_torques::RigTorques;
 
 /// The joint torques of a hypothesis on one trial, the reference for responses to changes.
-pub(crate) struct TorquesBeside<'a, const N: usize> {
+pub(crate) struct LinearizedTorques<'a, const N: usize> {
     session: &'a Session<N>,
     course: &'a Course<N>,
     hypothesis: Hypothesis<N>,
@@ -20,7 +20,7 @@ pub(crate) struct TorquesBeside<'a, const N: usize> {
     shown: Channels,
 }
 
-impl<'a, const N: usize> TorquesBeside<'a, N> {
+impl<'a, const N: usize> LinearizedTorques<'a, N> {
     /// Computes the torques of a hypothesis on a trial.
     ///
     /// # Errors
