@@ -11,7 +11,7 @@ mod preparation;
 mod recording;
 
 pub use closed_chain::linearized::{Change, Slopes};
-pub use closed_chain::stability::{Vibration, longest_step};
+pub use closed_chain::stability::{Vibration, longest_step, longest_step_on_contact};
 pub use engines::accuracy::{Resolved, resolve, simulate_accurately};
 #[doc(hidden)]
 pub use engines::batch::simulate_batch;

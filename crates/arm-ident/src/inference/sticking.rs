@@ -7,7 +7,7 @@ use arm_sim::longest_step;
 
 use crate::error::IdentError;
 use crate::regression::measured_motion::low_pass;
-use crate::regression::simulated_motion::{LONGEST_STEP, simulated};
+use crate::regression::simulated_motion::{USUAL_STEP, simulated};
 use crate::regression::trial::{Model, Trial};
 use crate::threads::parallel;
 
@@ -16,7 +16,7 @@ use crate::threads::parallel;
 /// solve as set-valued, then in all.
 pub(crate) fn sticking<const N: usize>(model: &Model<N>) -> Vec<Model<N>> {
     let steep = set_valued(model, |effect| {
-        NEARLY * longest_step(&model.chain, effect) < LONGEST_STEP
+        NEARLY * longest_step(&model.chain, effect) < USUAL_STEP
     });
     let all = set_valued(model, |effect| effect.parameters[0] > 0.0);
     let mut models: Vec<Model<N>> = steep.into_iter().chain(all).collect();

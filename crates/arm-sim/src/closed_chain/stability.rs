@@ -1,7 +1,7 @@
 //! Limits of the step: stability of the contact's vibration, and steep dry friction.
 
 use arm_core::effect::Effect;
-use arm_core::{Chain, Contact, Joints, Pose, inertia};
+use arm_core::{Chain, Contact, Joints, Pose, Setup, inertia};
 
 use crate::closed_chain::model::{Link, Model};
 use crate::{Integrator, SimulationError};
@@ -78,6 +78,22 @@ pub fn longest_step<const N: usize>(chain: &Chain<f64, N>, effect: &Effect<f64>)
         let rate = m[(effect.index, effect.index)] * p[0] / p[smoothing];
         RK4_DECAY / rate
     })
+}
+
+/// Longest step with which the fourth-order method keeps the vibration of an arm on a compliant contact from growing \[s\].
+///
+/// * `setup` - the rig
+/// * `q` - the pose at which it is judged \[rad\]
+///
+/// # Errors
+/// [`SimulationError`] for a rig that cannot be simulated.
+pub fn longest_step_on_contact<const N: usize>(
+    setup: &Setup<f64, N>,
+    q: &Joints<f64, N>,
+) -> Result<f64, SimulationError> {
+    let contact = setup.contact;
+    let model = Model::new(setup, Link::Compliant(contact), Vec::new())?;
+    Ok(Vibration::at(&contact, &model, q).largest_step(Integrator::Rk4))
 }
 
 /// Refuses a contact that is too stiff for the step, judged at one pose.
