@@ -19,7 +19,9 @@ export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 # With the bindings, which have no tests of their own: what both are built on is then compiled once.
 TESTED := --workspace --exclude hidden-world --exclude speed
-PYTEST := $(BIN)/python -m pytest --quiet --numprocesses auto --dist loadfile --no-loadscope-reorder
+# One more than there are cores, since tests wait for processes that they start.
+WORKERS := $(shell echo $$(($$(getconf _NPROCESSORS_ONLN || echo 2) + 1)))
+PYTEST := $(BIN)/python -m pytest --quiet --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 .PHONY: help demo test test-long bench bench-counts counts bench-kernels hidden fuzz fuzz-rust crosscheck lock fmu-libraries wheel wheels sdist docs guide mutants lint-workflows crates clean build format rust python
 .DELETE_ON_ERROR:
@@ -39,7 +41,7 @@ test: $(STAMPS)/venv ## formatting, lints, types, Rust and Python tests but the 
 	@unset MAKEFLAGS MFLAGS MAKELEVEL; $(MAKE) rust & half=$$!; $(MAKE) python; other=$$?; wait $$half && exit $$other
 	@echo "make test: everything passed"
 
-test-long: $(STAMPS)/dev ## the long Python tests: the thesis computed again, measured rigs, statistics over many draws
+test-long: $(STAMPS)/dev ## the long Python tests: the thesis computed again, measured rigs, statistics, reports in a browser, pages of the docs
 	$(PYTEST) -m long
 
 build: $(STAMPS)/build ## compile the extension module and install it into .venv

@@ -158,6 +158,7 @@ def test_a_repeat_that_broke_off_is_named(session: Path, tmp_path: Path) -> None
     assert {p.next_step for p in problems if "lasts" in p.text} == {"record this repeat again, or nothing if it was ended on purpose"}
 
 
+@pytest.mark.long
 def test_of_stretches_the_reflex_is_asked_for_and_no_test_trial(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Nothing was said of `spasticity`, and that the gap cannot be measured was a warning."""
     stretches = patients.session(patients.Patient(), 7001, emg=True)

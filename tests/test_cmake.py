@@ -16,6 +16,8 @@ import armrs
 from armrs import online
 from armrs.demo import true_model
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[1]
 LEVEL = 0.186 * 2.114 + (0.322 + 0.121) * 1.264
 """First moment of both segments about the shoulder, stretched out level [kg m]."""

@@ -163,6 +163,7 @@ def test_the_page_is_read_on_every_screen_and_on_paper(folder: Path) -> None:
     assert faults_on_paper(folder / "report.html") == []
 
 
+@pytest.mark.long
 def test_the_tutorial_runs_and_prints_what_it_shows(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

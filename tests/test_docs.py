@@ -128,6 +128,7 @@ def test_files_md_names_every_key_of_an_identification(session: Path) -> None:
         assert f"`{key}`" in text, key
 
 
+@pytest.mark.long
 def test_the_python_of_the_readme_prints_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -63,6 +63,7 @@ def commands(page: Path) -> Iterator[list[str]]:
                     yield words[1:]
 
 
+@pytest.mark.long
 def test_own_data_in_five_commands(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """From a German spreadsheet that was saved as text; and the clinician's page after them, with the norms that the page shows."""
     session = demo.measure_two_speeds(demo.true_model())

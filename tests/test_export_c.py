@@ -56,6 +56,7 @@ def numbers(lines: list[list[str]], name: str, single: bool) -> np.ndarray:
     return np.array([[struct.unpack(code, bytes.fromhex(word))[0] for word in line[1:]] for line in lines if line[0] == name])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", ["host-double", "m7", "host-single", "m4"])
 def test_the_torques_of_the_device_are_those_of_the_computer(identified: Path, target: str, tmp_path: Path) -> None:
     single = target in ("host-single", "m4")

@@ -26,6 +26,8 @@ from test_cohort import population, table
 from test_docs import DOCS, ROOT, blocks
 from test_sweep import EXPERIMENT as ONE_ARM
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def made(slow_arm: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Tabular]]:

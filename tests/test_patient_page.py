@@ -13,6 +13,7 @@ from armrs import cli
 from test_docs import DOCS, blocks
 
 
+@pytest.mark.long
 def test_the_page_runs_and_prints_what_it_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -139,6 +139,7 @@ def test_what_is_drawn_reaches_the_arm_and_not_what_is_believed(source: Path) ->
     assert heavy.truth.segments[1].com == pytest.approx((1.1 * alone * (hand.mass - 0.193) + 0.193 * hand.length) / hand.mass)
 
 
+@pytest.mark.long
 def test_processes_and_interruptions_change_no_byte(source: Path, plain: Path, tmp_path: Path) -> None:
     assert tables(armrs.sweep(source, tmp_path / "two", jobs=2).cases.parent) == tables(plain)
 
@@ -176,6 +177,7 @@ def test_a_killed_process_is_said_and_the_rest_is_done_later(source: Path, plain
     assert tables(armrs.sweep(source, tmp_path / "out").cases.parent) == tables(plain)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="groups of processes are POSIX")
 def test_a_killed_command_leaves_no_process_and_goes_on(source: Path, plain: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
@@ -196,6 +198,7 @@ def test_a_killed_command_leaves_no_process_and_goes_on(source: Path, plain: Pat
     assert 0 < done.run["computed"] < 5 and tables(out) == tables(plain)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("default")
 def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(source: Path, plain: Path, tmp_path: Path) -> None:
     if os.environ.get("CI") != "true":

@@ -254,7 +254,7 @@ impl Peer {
     }
 
     fn run(&self, integrator: Integrator, interval: Option<f64>) -> String {
-        let experiment = run(integrator, 20.0, interval);
+        let experiment = from_its_equilibrium(run(integrator, 20.0, interval));
         seconds_of(|| simulate(black_box(&experiment)).expect("runs"))
     }
 
@@ -314,7 +314,7 @@ fn from_its_equilibrium(mut experiment: Experiment<3>) -> Experiment<3> {
 fn right_to_an_accuracy(task: &[&str]) -> String {
     let single = |substeps| {
         let whole = run(Integrator::SemiImplicitEuler, 20.0, Some(0.02));
-        accurate(&whole, substeps)
+        accurate(&from_its_equilibrium(whole), substeps)
     };
     let all = |substeps| -> Vec<_> { batch().iter().map(|run| accurate(run, substeps)).collect() };
     match *task {
