@@ -224,7 +224,7 @@ GOALS = [
     _least(2, "batch: MuJoCo's rollout / armrs", "batch/MuJoCo, Python", "batch/armrs, Rust", 80),
     _least(2, "batch: one thread / two threads, wall clock", "batch:wall:1/armrs, Rust", "batch:wall:2/armrs, Rust", 1.7),
     _most(2, "single run right to 1e-6 rad: armrs / limit by Euler at 0.25 ms", "accurate/armrs, Rust", "accurate:euler/limit", 0.3),
-    _most(2, "batch right to 1e-6 rad: armrs / limit by Euler, with its step", "batch:accurate/armrs, Rust", "batch:accurate:fine/limit", 0.3),
+    _most(2, "batch right to 1e-6 rad: armrs / limit by Euler", "batch:accurate/armrs, Rust", "batch:accurate:fine/limit", 0.3),
     _most(3, "inverse dynamics: armrs / limit", "inverse_dynamics/armrs, Rust", "inverse_dynamics/limit", 2),
     _most(3, "forward dynamics: armrs / limit", "forward_dynamics/armrs, Rust", "forward_dynamics/limit", 1.5),
     _most(

@@ -177,31 +177,6 @@ impl Peer {
                 experiment.columns = Columns::All;
                 seconds_of(|| simulate(black_box(&experiment)).expect("runs"))
             }
-            ["check", "batch"] => {
-                let done = simulate_batch(&batch(), 1);
-                let ends = done[done.len() - 4..].iter().flat_map(|r| {
-                    let q = &r.as_ref().expect("runs").q;
-                    q[q.len() - 3..].to_vec()
-                });
-                json(&ends.collect::<Vec<_>>())
-            }
-            ["check", "bits"] => bits().to_string(),
-            ["batch"] => {
-                let runs = batch();
-                seconds_of(|| simulate_batch(black_box(&runs), 1))
-            }
-            ["batch", "all"] => {
-                let runs = batch_of(Columns::All);
-                seconds_of(|| simulate_batch(black_box(&runs), 1))
-            }
-            ["batch", "runs", n] => {
-                let runs = &batch()[..n.parse().expect("a number of runs")];
-                seconds_of(|| simulate_batch(black_box(runs), 1))
-            }
-            ["batch", "wall", threads] => {
-                let (runs, threads) = (batch(), threads.parse().expect("threads"));
-                wall_seconds_of(|| simulate_batch(black_box(&runs), threads))
-            }
             ["check", "cascade", n] => {
                 let (q, force) = self.samples(n);
                 let found = cascade(&q, &force);
@@ -216,7 +191,7 @@ impl Peer {
                 let (q, force) = self.samples(n);
                 seconds_of(|| cascade(black_box(&q), black_box(&force)))
             }
-            ref words => right_to_an_accuracy(words),
+            ref words => batches(words).unwrap_or_else(|| right_to_an_accuracy(words)),
         }
     }
 
@@ -308,6 +283,38 @@ fn from_its_equilibrium(mut experiment: Experiment<3>) -> Experiment<3> {
         qd: Joints::zeros(),
     };
     experiment
+}
+
+/// W3; nothing for another task.
+fn batches(task: &[&str]) -> Option<String> {
+    Some(match *task {
+        ["check", "batch"] => {
+            let done = simulate_batch(&batch(), 1);
+            let ends = done[done.len() - 4..].iter().flat_map(|r| {
+                let q = &r.as_ref().expect("runs").q;
+                q[q.len() - 3..].to_vec()
+            });
+            json(&ends.collect::<Vec<_>>())
+        }
+        ["check", "bits"] => bits().to_string(),
+        ["batch"] => {
+            let runs = batch();
+            seconds_of(|| simulate_batch(black_box(&runs), 1))
+        }
+        ["batch", "all"] => {
+            let runs = batch_of(Columns::All);
+            seconds_of(|| simulate_batch(black_box(&runs), 1))
+        }
+        ["batch", "runs", n] => {
+            let runs = &batch()[..n.parse().expect("a number of runs")];
+            seconds_of(|| simulate_batch(black_box(runs), 1))
+        }
+        ["batch", "wall", threads] => {
+            let (runs, threads) = (batch(), threads.parse().expect("threads"));
+            wall_seconds_of(|| simulate_batch(black_box(&runs), threads))
+        }
+        _ => return None,
+    })
 }
 
 /// W2a and W3a.
