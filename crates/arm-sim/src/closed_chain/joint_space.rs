@@ -151,12 +151,36 @@ impl<T: Scalar, const N: usize> BiasAndJacobian<T, N> {
         (pose, qd): (&Pose<T, N>, &Joints<T, N>),
     ) -> Self {
         let still = Joints::<T, N>::repeat(T::ZERO);
+        let bias = inverse_dynamics(chain, pose, qd, &still);
+        Self::with_bias(bias, chain, base, placement, (pose, qd))
+    }
+
+    /// At rest: the same bits.
+    pub fn at_rest(
+        chain: &Chain<T, N>,
+        base: Option<&MovingBase<T>>,
+        placement: Option<&Placement<T>>,
+        pose: &Pose<T, N>,
+    ) -> Self {
+        let still = Joints::<T, N>::repeat(T::ZERO);
+        let bias = gravity(chain, pose);
+        Self::with_bias(bias, chain, base, placement, (pose, &still))
+    }
+
+    fn with_bias(
+        bias: Joints<T, N>,
+        chain: &Chain<T, N>,
+        base: Option<&MovingBase<T>>,
+        placement: Option<&Placement<T>>,
+        (pose, qd): (&Pose<T, N>, &Joints<T, N>),
+    ) -> Self {
         let j = jacobian(chain, pose);
         let mut given = Self {
-            bias: inverse_dynamics(chain, pose, qd, &still),
+            bias,
             jacobian: [0, 1].map(|row| from_fn(|k| j[(row, k)])),
         };
         if let Some(base) = base {
+            let still = Joints::<T, N>::repeat(T::ZERO);
             let [uy, uz] = base.per_angle;
             let [fy, fz] = joint_force(chain, pose, (qd, &still), [T::ZERO; 2])[0];
             given.bias[0] += uy * fy + uz * fz;

@@ -494,8 +494,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// Bias and Jacobian of the arm at rest.
     pub fn bias_and_jacobian_at_rest(&self, pose: &Pose<T, N>) -> BiasAndJacobian<T, N> {
-        let at = (pose, &Joints::repeat(T::ZERO));
-        BiasAndJacobian::new(&self.chain, self.base.as_ref(), self.placement.as_ref(), at)
+        let (base, placement) = (self.base.as_ref(), self.placement.as_ref());
+        BiasAndJacobian::at_rest(&self.chain, base, placement, pose)
     }
 
     /// The equation of motion in joint coordinates.

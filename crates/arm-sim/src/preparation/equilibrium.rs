@@ -125,9 +125,11 @@ struct Slopes {
     /// By row of the residual.
     rows: [Values; MOST],
     unknowns: usize,
-    /// By joint, whether it is not held.
-    free: [bool; MOST],
     joints: usize,
+    /// Stiffness of the joints that are not held, symmetric and across a constraint made large, in its first rows and columns.
+    stiffness: [Values; MOST],
+    /// How many joints are not held.
+    free: usize,
     /// Largest stiffness \[N m/rad\]; 1 where there is none.
     scale: f64,
 }
@@ -135,7 +137,7 @@ struct Slopes {
 impl Slopes {
     /// By central differences.
     fn at<R: Fn(&Values) -> Values>(balance: &Balance<R>, x: &Values) -> Self {
-        let (unknowns, joints) = (balance.unknowns, balance.held.len());
+        let unknowns = balance.unknowns;
         let mut rows = [[0.0; MOST]; MOST];
         for k in 0..unknowns {
             let shifted = |by: f64| {
@@ -148,47 +150,51 @@ impl Slopes {
                 row[k] = (more[i] - less[i]) / (2.0 * SMALL);
             }
         }
-        let mut free = [false; MOST];
-        for (free, held) in free.iter_mut().zip(balance.held) {
-            *free = !held;
-        }
-        let mut slopes = Self {
-            rows,
-            unknowns,
-            free,
-            joints,
-            scale: 1.0,
-        };
-        let pairs = slopes
-            .free()
-            .flat_map(|i| slopes.free().map(move |k| (i, k)));
-        let largest = pairs.fold(0.0, |m: f64, (i, k)| m.max(rows[i][k].abs()));
-        if largest > 0.0 {
-            slopes.scale = largest;
-        }
-        slopes
+        Self::of(rows, unknowns, balance.held)
     }
 
-    /// The joints that are not held.
-    fn free(&self) -> impl Iterator<Item = usize> {
-        let free = self.free;
-        (0..self.joints).filter(move |&j| free[j])
+    fn of(rows: [Values; MOST], unknowns: usize, held: &[bool]) -> Self {
+        let joints = held.len();
+        let mut places = [0; MOST];
+        let mut free = 0;
+        for joint in (0..joints).filter(|&j| !held[j]) {
+            places[free] = joint;
+            free += 1;
+        }
+        let places = &places[..free];
+        let mut scale: f64 = 0.0;
+        for &p in places {
+            for &q in places {
+                scale = scale.max(rows[p][q].abs());
+            }
+        }
+        if scale == 0.0 {
+            scale = 1.0;
+        }
+        let mut stiffness = [[0.0; MOST]; MOST];
+        for (row, &p) in stiffness.iter_mut().zip(places) {
+            for (entry, &q) in row.iter_mut().zip(places) {
+                *entry = 0.5 * (rows[p][q] + rows[q][p]);
+                for constraint in &rows[joints..unknowns] {
+                    let square: f64 = constraint[..joints].iter().map(|g| g * g).sum();
+                    *entry += scale / ROUNDING * constraint[p] * constraint[q] / square;
+                }
+            }
+        }
+        Self {
+            rows,
+            unknowns,
+            joints,
+            stiffness,
+            free,
+            scale,
+        }
     }
 
     /// Whether the stiffness of the free joints and a damping is positive definite, within a constraint: Cholesky's
     /// factors are real. Across a constraint it is made so by a large multiple (Debreu 1952).
     fn definite(&self, damping: f64) -> bool {
-        let mut a = [[0.0; MOST]; MOST];
-        let n = self.free().count();
-        for (row, p) in a.iter_mut().zip(self.free()) {
-            for (entry, q) in row.iter_mut().zip(self.free()) {
-                *entry = 0.5 * (self.rows[p][q] + self.rows[q][p]);
-                for constraint in &self.rows[self.joints..self.unknowns] {
-                    let square: f64 = constraint[..self.joints].iter().map(|g| g * g).sum();
-                    *entry += self.scale / ROUNDING * constraint[p] * constraint[q] / square;
-                }
-            }
-        }
+        let (mut a, n) = (self.stiffness, self.free);
         for (i, row) in a[..n].iter_mut().enumerate() {
             row[i] += damping;
         }
