@@ -276,7 +276,7 @@ fn run(integrator: Integrator, duration: f64, interval: Option<f64>) -> Experime
 /// An experiment from the angles of its equilibrium, found before: as other tools start.
 fn from_its_equilibrium(mut experiment: Experiment<3>) -> Experiment<3> {
     let mut short = experiment.clone();
-    short.duration = 0.02;
+    (short.duration, short.output_interval) = (0.02, Some(0.02));
     let found = simulate(&short).expect("runs").q;
     experiment.start = Start::Given {
         q: Joints::from_column_slice(&found[..3]),
