@@ -12,7 +12,7 @@ import sys
 from typing import Any
 
 import problem
-from programs import Missing, Peer
+from programs import Missing, Peer, countable
 from workloads import Measured
 
 NATIVE = ("armrs, Rust", "limit", "limit, nothing fused", "MuJoCo, C", "Pinocchio, C++")
@@ -35,15 +35,19 @@ def measure(peers: dict[str, Peer], items: list[Measured], chosen: dict[str, dic
         return {}, {"instructions": "no program valgrind"}
     counts: dict[str, float] = {}
     missing: dict[str, str] = {}
+    commands = {tool: countable(tool, peer.command) for tool, peer in peers.items() if tool in NATIVE}
     for item in items:
-        if item.tool not in NATIVE or item.tool not in peers or item.workload not in WORKLOADS or ":wall:" in item.task:
+        if item.tool not in commands or item.workload not in WORKLOADS:
+            continue
+        # Threads wait for each other, and the finest steps would take minutes.
+        if ":wall:" in item.task or ":fine" in item.task:
             continue
         task = f"{item.task}:{chosen[item.key]['rung']}" if item.ladder else item.task
         # A kernel is called for all states at once, and is too short for one call.
         calls, units = (100, 100 * problem.STATES) if item.workload == "W1" else (1, item.units)
         print(f"instructions of {task} of {item.tool}", file=sys.stderr, flush=True)
         try:
-            once, more = (collected(peers[item.tool].command, f"exactly:{n}\n{task}\n") for n in (0, calls))
+            once, more = (collected(commands[item.tool], f"exactly:{n}\n{task}\n") for n in (0, calls))
             counts[item.key] = (more - once) / units
         except Missing as reason:
             missing[f"instructions of {item.tool}"] = str(reason)
