@@ -144,34 +144,11 @@ pub(crate) struct BiasAndJacobian<T, const N: usize> {
 }
 
 impl<T: Scalar, const N: usize> BiasAndJacobian<T, N> {
+    /// * `bias` - that of an arm on a base at rest; at rest itself its gravity, which has the bits of its inverse dynamics
     pub fn new(
-        chain: &Chain<T, N>,
-        base: Option<&MovingBase<T>>,
-        placement: Option<&Placement<T>>,
-        (pose, qd): (&Pose<T, N>, &Joints<T, N>),
-    ) -> Self {
-        let still = Joints::<T, N>::repeat(T::ZERO);
-        let bias = inverse_dynamics(chain, pose, qd, &still);
-        Self::with_bias(bias, chain, base, placement, (pose, qd))
-    }
-
-    /// At rest: the same bits.
-    pub fn at_rest(
-        chain: &Chain<T, N>,
-        base: Option<&MovingBase<T>>,
-        placement: Option<&Placement<T>>,
-        pose: &Pose<T, N>,
-    ) -> Self {
-        let still = Joints::<T, N>::repeat(T::ZERO);
-        let bias = gravity(chain, pose);
-        Self::with_bias(bias, chain, base, placement, (pose, &still))
-    }
-
-    fn with_bias(
         bias: Joints<T, N>,
         chain: &Chain<T, N>,
-        base: Option<&MovingBase<T>>,
-        placement: Option<&Placement<T>>,
+        (base, placement): (Option<&MovingBase<T>>, Option<&Placement<T>>),
         (pose, qd): (&Pose<T, N>, &Joints<T, N>),
     ) -> Self {
         let j = jacobian(chain, pose);
@@ -215,9 +192,10 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
         (pose, qd): (&Pose<T, N>, &Joints<T, N>),
     ) -> Self {
         let rate = jacobian_rate(chain, pose, qd);
+        let bias = inverse_dynamics(chain, pose, qd, &Joints::repeat(T::ZERO));
         let mut terms = Self {
             inertia: inertia(chain, pose),
-            given: BiasAndJacobian::new(chain, base, placement, (pose, qd)),
+            given: BiasAndJacobian::new(bias, chain, (base, placement), (pose, qd)),
             jacobian_rate: [0, 1].map(|row| {
                 let mut sum = T::ZERO;
                 for k in 0..N {

@@ -5,7 +5,8 @@ use arm_core::effect::{
 };
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
-    Setup, accelerations, joint_force, kinetic_energy, potential_energy, tip, tip_velocity,
+    Setup, accelerations, gravity, joint_force, kinetic_energy, potential_energy, tip,
+    tip_velocity,
 };
 
 use crate::closed_chain::branch_free::{BranchFree, affine, contact_gap, load, pull};
@@ -494,8 +495,14 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// Bias and Jacobian of the arm at rest.
     pub fn bias_and_jacobian_at_rest(&self, pose: &Pose<T, N>) -> BiasAndJacobian<T, N> {
-        let (base, placement) = (self.base.as_ref(), self.placement.as_ref());
-        BiasAndJacobian::at_rest(&self.chain, base, placement, pose)
+        let attached = (self.base.as_ref(), self.placement.as_ref());
+        let bias = gravity(&self.chain, pose);
+        BiasAndJacobian::new(
+            bias,
+            &self.chain,
+            attached,
+            (pose, &Joints::repeat(T::ZERO)),
+        )
     }
 
     /// The equation of motion in joint coordinates.
