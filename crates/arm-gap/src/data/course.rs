@@ -277,6 +277,14 @@ pub fn difference(a: &Channels, b: &Channels) -> Channels {
     std::iter::zip(a, b).map(one).collect()
 }
 
+/// Each value of channels divided by a size.
+pub(crate) fn divided(mut channels: Channels, size: f64) -> Channels {
+    for value in channels.iter_mut().flatten() {
+        *value /= size;
+    }
+    channels
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use arm_core::{Chain, Contact, sample_arms};

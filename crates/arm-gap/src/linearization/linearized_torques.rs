@@ -2,7 +2,7 @@
 
 use arm_sim::SimulationError;
 
-use crate::data::course::{Channels, Course, difference, smooth};
+use crate::data::course::{Channels, Course, difference, divided, smooth};
 use crate::data::session::Session;
 use crate::hypothesis::Hypothesis;
 use crate::linearization::linear_response::Change;
@@ -58,17 +58,14 @@ impl<'a, const N: usize> LinearizedTorques<'a, N> {
             return Ok(Vec::new());
         };
         let in_joints = rig.difference(self.session, &self.hypothesis, &change.changed)?;
-        let mut out = match in_joints {
+        let out = match in_joints {
             Some(more) => more,
             None => {
                 let changed = self.session.torques(&change.changed, self.course)?;
                 difference(&changed, &self.shown)
             }
         };
-        for value in out.iter_mut().flatten() {
-            *value /= change.size;
-        }
-        self.in_band(&out)
+        self.in_band(&divided(out, change.size))
     }
 
     fn in_band(&self, channels: &Channels) -> Result<Channels, SimulationError> {

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use arm_sim::SimulationError;
 
 use crate::GapError;
-use crate::data::course::{Channels, Course, difference, smooth};
+use crate::data::course::{Channels, Course, difference, divided, smooth};
 use crate::data::session::ComparisonMode;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::linearization::linear_response::{Change, Response};
@@ -396,9 +396,5 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// The difference of channels for one unit of a change.
 pub(crate) fn slope(up: &Channels, base: &Channels, size: f64) -> Channels {
-    let mut out = difference(up, base);
-    for value in out.iter_mut().flatten() {
-        *value /= size;
-    }
-    out
+    divided(difference(up, base), size)
 }
