@@ -78,6 +78,7 @@ def test_forces_on_another_clock_are_named(session: Path, tmp_path: Path) -> Non
     assert line.endswith("and 5 more: forces are about 0.3 s early against the angles")
 
 
+@pytest.mark.long
 def test_a_robot_that_stands_elsewhere_than_the_model_says_is_told(tmp_path: Path) -> None:
     """Two centimetres were named as play of the handle."""
     dataset = demo.measure(demo.true_model())

@@ -321,6 +321,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     yield tmp_path
 
 
+@pytest.mark.long
 def test_run_writes_samples_figures_and_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["fmu", "run", "wall.toml", "-o", "out"]) == 0
     assert "wall.toml: 2 s coupled" in capsys.readouterr().out

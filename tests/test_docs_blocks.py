@@ -135,6 +135,7 @@ def test_a_carried_arm_as_its_page_says(folder: Path, capsys: pytest.CaptureFixt
     assert (folder / "supported" / "figures" / "stiffness-reach.png").is_file()
 
 
+@pytest.mark.long
 def test_python_of_the_gap_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_dataset(demo.measure_two_speeds(demo.true_model()), "session")
     shutil.copytree("session", "session of another day")

@@ -106,6 +106,7 @@ def truth(whole: Slave, t: np.ndarray, joints: int) -> dict[str, np.ndarray]:
     return found | {f"spring.F[{k}]": -table[joints + k - 1] for k in (1, 2)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", range(30))
 def test_the_estimate_is_within_a_factor_of_two_of_the_error(number: int) -> None:
     joints, algorithm, step = cases()[number]

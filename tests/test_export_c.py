@@ -112,6 +112,7 @@ def test_an_older_result_without_correlations_is_taken(identified: Path, tmp_pat
     assert np.array_equal(covariance, np.diag(np.diag(covariance)))
 
 
+@pytest.mark.long
 def test_a_device_whose_torque_differs_by_a_bit_says_so(identified: Path, tmp_path: Path) -> None:
     source = export_c(identified / "identified.toml")
     first = float(source.torques[0, 0])

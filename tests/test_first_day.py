@@ -95,6 +95,7 @@ def imported(world: Path) -> Path:
     return world / "session"
 
 
+@pytest.mark.long
 def test_german_exports_become_the_recorded_samples(world: Path, imported: Path) -> None:
     truth = {(t.configuration, t.repeat): t for t in armrs.load_dataset(world / "m060310" / "data").trials}
     found = armrs.load_dataset(imported)
@@ -106,12 +107,14 @@ def test_german_exports_become_the_recorded_samples(world: Path, imported: Path)
         assert np.nanmax(np.abs(trial.robot_q - true.robot_q)) < 1e-6
 
 
+@pytest.mark.long
 def test_what_init_wrote_about_the_subject_is_kept(imported: Path) -> None:
     found = armrs.load_dataset(imported)
     assert (found.subject.body_mass, found.subject.height, found.subject.sex) == (63.0, 1.75, "male")
     assert found.tolerance.angle_offset == pytest.approx(np.radians(0.5))
 
 
+@pytest.mark.long
 def test_the_robot_is_read_off_its_angles(world: Path, imported: Path) -> None:
     """A slipped sensor and a contact that gives way by a millimetre made links 2 mm too short; tape lengths are 0.4 mm off here."""
     true, found = (armrs.load_model(folder / "model.toml").robot for folder in (world / "m060310" / "data", imported))
@@ -123,6 +126,7 @@ def test_the_robot_is_read_off_its_angles(world: Path, imported: Path) -> None:
     assert next(v.why for v in checked.verbs if v.verb == "gap") == "by angles and forces, arm and robot simulated together"
 
 
+@pytest.mark.long
 def test_a_missing_robot_is_told(imported: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     dataset = armrs.load_dataset(imported)
     out = armrs.write_dataset(dataset.replace(model=dataset.model.replace(robot=None)), tmp_path / "set").parent
@@ -130,6 +134,7 @@ def test_a_missing_robot_is_told(imported: Path, tmp_path: Path, capsys: pytest.
     assert len(told) == 1 and told[0].level == "warning" and "gap compares joint torques only" in told[0].text
 
 
+@pytest.mark.long
 def test_import_toml_alone_repeats_an_import_anywhere(imported: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It needed --model, and named raw files by the folder in which the command ran."""
     monkeypatch.chdir(tmp_path)
@@ -142,6 +147,7 @@ def test_import_toml_alone_repeats_an_import_anywhere(imported: Path, tmp_path: 
         armrs.import_recordings([imported / "trials"], tmp_path / "none")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("apart", "within"), [(0.0, 0.015), (0.7, 0.035)])
 def test_forces_on_their_own_clock_share_the_laws_of_the_arm(world: Path, apart: float, within: float) -> None:
     """Started by one trigger, or each at another time; of another session of this world each trial by itself was up to 0.2 s off."""
@@ -158,6 +164,7 @@ def test_forces_on_their_own_clock_share_the_laws_of_the_arm(world: Path, apart:
     assert (np.ptp(shifts) == 0.0) == (apart == 0.0)
 
 
+@pytest.mark.long
 def test_a_column_of_remarks_is_told(world: Path, imported: Path, tmp_path: Path) -> None:
     """One remark among numbers' empty cells was a column of missing numbers, and was offered as an angle; then it was printed and lost."""
     done = armrs.import_recordings([world / "raw"], tmp_path / "set", model=imported / "model.toml")
@@ -203,6 +210,7 @@ def in_pounds(dataset: armrs.Dataset) -> armrs.Dataset:
     return dataset.replace(trials=tuple(dataclasses.replace(t, force_on_arm=4.4482216 * t.force_on_arm) for t in dataset.trials))
 
 
+@pytest.mark.long
 def test_forces_in_another_unit_and_another_body_are_told(imported: Path, tmp_path: Path) -> None:
     """The springs took up what the weight of the arm left, and nothing was said."""
     dataset = armrs.load_dataset(imported)
@@ -226,6 +234,7 @@ def test_forces_in_another_unit_and_another_body_are_told(imported: Path, tmp_pa
     assert torque_balance.weight_of(dataset.model, [still(dataset)]) is None
 
 
+@pytest.mark.long
 def test_another_weight_that_the_named_effects_explain_is_taken_back(imported: Path) -> None:
     """A relaxation of the shoulder was named correctly, but a warning about a sixth of the weight remained that the fit did not confirm."""
     wrong = in_pounds(armrs.load_dataset(imported))
@@ -250,6 +259,7 @@ def still(dataset: armrs.Dataset) -> torque_balance.Motion:
     return motion
 
 
+@pytest.mark.long
 def test_one_trial_says_what_it_cannot_tell(imported: Path) -> None:
     """Its intervals were as those of repeats, and nothing was said."""
     dataset = armrs.load_dataset(imported)
@@ -327,6 +337,7 @@ def test_a_name_is_recognised(name: str) -> None:
     assert symbol_of(column(name, np.zeros(3))) == NAMES[name]
 
 
+@pytest.mark.long
 def test_a_force_downward_is_turned(imported: Path, tmp_path: Path) -> None:
     raw = tmp_path / "raw"
     raw.mkdir()
@@ -387,6 +398,7 @@ def test_a_picture_knows_its_shape(size: tuple[float, float], shape: str) -> Non
     assert html.Picture("x.png", "x", "x", None).shape == ""
 
 
+@pytest.mark.long
 def test_a_data_set_is_a_table_of_its_trials(imported: Path) -> None:
     """`pd.DataFrame(dataset)` ended with a TypeError, where it works for every result."""
     pandas = pytest.importorskip("pandas")

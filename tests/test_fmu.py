@@ -122,6 +122,7 @@ def test_licences_travel_whole(fmi: int, folder: Path) -> None:
         assert re.search(rf"^{package} \d", text, flags=re.M), package
 
 
+@pytest.mark.long
 def test_an_arm_of_each_length(tmp_path: Path) -> None:
     segment = Segment("part", 0.3, 1.5, 0.15, 0.01)
     for n, port in enumerate(("force", "motion") * 3, start=1):

@@ -118,6 +118,7 @@ def test_an_fmu_for_scheduled_execution_alone_is_tried(defect: str, tmp_path: Pa
     assert [fmu_defects.LIBRARY[defect] in text for text in found][:1] == [True] if defect else found == []
 
 
+@pytest.mark.long
 @NEEDS_COMPILER
 def test_an_fmu_that_can_be_instantiated_only_once_is_tried_in_several_processes(tmp_path: Path) -> None:
     once = fmu_defects.SMALL.replace('modelIdentifier="small"', 'modelIdentifier="small" canBeInstantiatedOnlyOncePerProcess="true"')

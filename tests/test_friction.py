@@ -168,6 +168,7 @@ def judged(run: armrs.Simulated, fine: armrs.Simulated) -> tuple[float, float]:
     return float(angle), float(np.hypot(*(run.force_on_arm - fine.force_on_arm).T).max() / np.hypot(*fine.force_on_arm.T).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", STRONG)
 def test_without_a_step_one_is_taken_that_follows_the_friction(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     """`armrs simulate` printed 1126 N for 336 N."""
@@ -216,6 +217,7 @@ def random_arm(rng: np.random.Generator, joints: int) -> tuple[str, armrs.Moveme
     return text, armrs.Movement(path, speed=1.5, acceleration=6.0)
 
 
+@pytest.mark.long
 def test_no_run_with_smooth_friction_is_wrong_in_silence(tmp_path: Path) -> None:
     """Random arms without a step against a twentieth of 0.25 ms, or a quarter of what is taken; arms = 200: docs/conventions.md."""
     arms = 12

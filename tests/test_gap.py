@@ -135,6 +135,7 @@ def test_nothing_is_missing_where_nothing_is_hidden(tmp_path: Path, capsys: pyte
     assert verdict.startswith("Nothing is missing")
 
 
+@pytest.mark.long
 def test_dry_friction_of_a_real_rig_is_named_and_nothing_is_called_noise_without_repeats(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -318,6 +318,7 @@ def test_a_calibration_far_beyond_its_tolerance_is_not_decided_by_the_model(slow
     assert small and all(e.decided_by == "prior" for e in small)
 
 
+@pytest.mark.long
 def test_an_arm_of_which_little_is_known_is_identified_with_default_options(tmp_path: Path) -> None:
     """Three segments by the literature, cameras, no joint law: the model as given cannot be simulated, and what measured motion alone
     tells of the wrist is noise."""

@@ -68,6 +68,7 @@ def test_clocks_of_a_session_are_found_together(seed: int, tmp_path: Path) -> No
         assert abs(error) <= max(case.step, 0.02)
 
 
+@pytest.mark.long
 def test_a_period_that_nothing_tells_is_in_doubt(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

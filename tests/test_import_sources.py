@@ -155,6 +155,7 @@ def on_a_terminal(arguments: list[str], answers: bytes) -> str:
     return said.decode()
 
 
+@pytest.mark.long
 def test_columns_without_names_are_asked_for_with_a_guess(recording: Recording, tmp_path: Path) -> None:
     values = np.column_stack([recording.t, recording.q, recording.force_on_robot])
     path = write_text(tmp_path / "slow_1.csv", ["a", "b", "c", "d", "e"], values)

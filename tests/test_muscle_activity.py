@@ -139,6 +139,7 @@ def disturbed_session(seed: int) -> tuple[armrs.Dataset, armrs.Dataset]:
     return dataset.replace(trials=tuple(trials)), dataset.replace(trials=(trials[0], burst, trials[2]))
 
 
+@pytest.mark.long
 def test_a_marked_burst_moves_passive_moments_by_the_noise_of_what_is_lost() -> None:
     """In units of the usual interval of each configuration of the thesis: that of three repeats is narrow where these agree by chance."""
 

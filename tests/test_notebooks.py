@@ -22,6 +22,7 @@ def notebook(request: pytest.FixtureRequest) -> Path:
     return request.param
 
 
+@pytest.mark.long
 def test_it_runs_and_draws(notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a namespace of its own, as plain Python: there are no magics in it, and warnings are errors."""
     matplotlib.use("Agg")

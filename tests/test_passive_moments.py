@@ -36,6 +36,7 @@ def result(session: Dataset) -> passive.PassiveMoments:
     return armrs.passive_moments(session)
 
 
+@pytest.mark.long
 def test_hidden_moments_come_back_in_all_ten_configurations(known: list[check_passive.Configuration]) -> None:
     rows = list(check_passive.recovered(known, 4, 0.0, 1.0))
     assert len(rows) == 20

@@ -180,6 +180,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is told in other units")
 def test_memory_does_not_grow_with_the_run(slow_arm: Path, tmp_path: Path) -> None:
     """Beyond a few pieces; 200 000 samples more would be 90 MB, and were twice that."""

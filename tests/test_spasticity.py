@@ -38,6 +38,7 @@ def test_threshold_gain_and_latency_are_recovered() -> None:
         assert value["latency"] == pytest.approx(patient.latency, abs=5e-3)
 
 
+@pytest.mark.long
 def test_patients_of_the_virtual_laboratory_are_recovered() -> None:
     """With a robot, cameras, tone and a wrong model of the arm; `bench/virtual_patients.py --laboratory` has two hundred of them."""
     for number in range(3):
@@ -52,6 +53,7 @@ def test_patients_of_the_virtual_laboratory_are_recovered() -> None:
         assert value["latency"] == pytest.approx(patient.latency, abs=5e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [SEED, SEED + 1])
 def test_a_burst_in_a_slow_stretch_moves_no_estimate_by_a_tenth_of_its_interval(seed: int) -> None:
     """It moved the onset by a third: the muscle is active at a speed at which no reflex acts, so what it does is its own."""
