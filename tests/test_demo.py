@@ -158,6 +158,7 @@ def test_the_terminal_begins_with_the_result_and_the_report_and_ends_with_how_to
     assert f"armrs gap {tmp_path / 'data'}" in go_on
 
 
+@pytest.mark.long
 def test_the_page_is_read_on_every_screen_and_on_paper(folder: Path) -> None:
     assert faults_on_screens(folder / "report.html") == []
     assert faults_on_paper(folder / "report.html") == []

@@ -122,6 +122,7 @@ def test_python_of_the_firmware_page(folder: Path, capsys: pytest.CaptureFixture
     assert "beyond the limit" in printed and Path("replay.html").is_file()
 
 
+@pytest.mark.long
 def test_a_carried_arm_as_its_page_says(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shown = blocks(DOCS / "closed-loop.md")
     for language, name, content in shown:
@@ -195,6 +196,7 @@ def test_the_effect_of_the_developer_guide_fits_the_catalogue() -> None:
             assert (ROOT / path).is_file(), path
 
 
+@pytest.mark.long
 def test_the_session_of_the_developer_guide_names_its_effect(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With the law of the catalogue that is most like that of the guide, which is compiled by `make guide` alone."""
     demo.true_model().write("truth.toml")

@@ -74,6 +74,7 @@ def angles(slave: Slave) -> np.ndarray:
     return np.array([slave.variables[f"q[{k + 1}]"].start for k in range(slave.model.n_joints)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", ARMS)
 def test_a_start_at_rest_is_where_a_damped_arm_settles_in_mujoco(case: str) -> None:
     n, springs, port, starts = ARMS[case]

@@ -85,6 +85,7 @@ STRONG = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", STRONG)
 @pytest.mark.parametrize("engine", ["native", "rapier"])
 def test_strong_friction_does_not_depend_on_the_step(tmp_path: Path, name: str, engine: str) -> None:

@@ -107,6 +107,7 @@ def test_a_session_in_another_unit_is_told(slow_arm: Path, tmp_path: Path, capsy
     assert {(c["kind"], c["joint"]): len(c["dates"]) for c in courses if c["kind"] == "coulomb"} == {("coulomb", 1): 2, ("coulomb", 2): 1}
 
 
+@pytest.mark.long
 def test_the_verb(slow_arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "s.sqlite"
     for folder, date in ((slow_arm, "2026-01-01"), (folder_again(slow_arm, tmp_path / "again"), "2026-02-01")):

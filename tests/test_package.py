@@ -55,6 +55,7 @@ def test_the_python_of_the_readme_runs() -> None:
         assert done.stdout
 
 
+@pytest.mark.long
 def test_every_example_runs() -> None:
     for path in sorted((ROOT / "examples").rglob("*.py")):
         done = python("-W", "error", str(path))

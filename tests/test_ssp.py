@@ -112,6 +112,7 @@ def test_a_system_goes_there_and_back(folder: Path) -> None:
         np.testing.assert_array_equal(found[name], values)
 
 
+@pytest.mark.long
 def test_the_example_goes_there_and_back(folder: Path) -> None:
     """Two arms hand in hand: energies have the same sign where they are read back."""
     system = load_system(ARM.parent / "two-arms.toml")

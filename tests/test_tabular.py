@@ -116,6 +116,7 @@ def results(identified: armrs.Identified, run: armrs.Simulated, folder: Path) ->
     }
 
 
+@pytest.mark.long
 def test_every_result_draws_and_writes_the_figures_of_its_report(
     identified: armrs.Identified, run: armrs.Simulated, tmp_path: Path
 ) -> None:
@@ -177,6 +178,7 @@ def test_a_history_is_a_tidy_frame(identified: armrs.Identified, tmp_path: Path)
     assert "nothing changed in the last session" in repr(followed)
 
 
+@pytest.mark.long
 def test_tables_of_a_report_fit_on_a4(identified: armrs.Identified, tmp_path: Path) -> None:
     passive = armrs.passive_moments(identified.dataset)
     for result in (identified, passive):

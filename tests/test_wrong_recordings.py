@@ -59,6 +59,7 @@ def test_a_right_session_is_not_warned_of() -> None:
     assert not [line for line in reflexes().warnings if line.startswith("angles of arm") or "masses" in line or "swapped" in line]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degrees", [2.0, 5.0])
 def test_robot_angles_with_another_zero_change_nothing_and_are_named(degrees: float, tmp_path: Path) -> None:
     """The path of the handle was followed where the arm cannot reach: moments of 10⁶ N m, and no line about it."""
@@ -80,6 +81,7 @@ def test_the_fast_motion_does_not_depend_on_the_zeros_of_the_robot() -> None:
     assert np.abs(right.q - other.q).max() < np.radians(0.2)
 
 
+@pytest.mark.long
 def test_a_wrong_zero_of_the_elbow_is_named_and_no_change_is_made_of_it(tmp_path: Path) -> None:
     """`armrs check` named it, and a history of reflexes called gain, latency, viscosity and friction changed."""
     wrong = off_by((0.0, 5.0))
