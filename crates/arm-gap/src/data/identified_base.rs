@@ -29,7 +29,7 @@ const REST_SD: f64 = 1.0;
 /// Range of an angle in the common band up to which its joint hardly moves \[rad\]: a slip of a sensor or a soft orthosis makes as much.
 pub const STILL: f64 = 0.01;
 /// Share of the furthest turning joint's range below which a joint turns little: friction that holds it nearly all the time lets it slip.
-const LITTLE: f64 = 0.5;
+const SMALL_RANGE: f64 = 0.5;
 /// Furthest start of a segment from its literature values, in standard deviations.
 const FURTHEST_START: f64 = 3.0;
 
@@ -227,7 +227,7 @@ impl<const N: usize> Session<N> {
             let expected = law.kind.prior().typical * self.weight_moment(law.index);
             let resists =
                 law.kind.family() == Family::Rate && law.parameters[0] > FURTHEST * expected;
-            still[law.index] |= resists && reach[law.index] < LITTLE * furthest;
+            still[law.index] |= resists && reach[law.index] < SMALL_RANGE * furthest;
         }
         still
     }

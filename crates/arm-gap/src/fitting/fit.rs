@@ -22,7 +22,7 @@ const ENOUGH: f64 = 0.2;
 /// and where the model is far from the data, less than this share of what the cost exceeds the number of rows by.
 const SHARE: f64 = 1e-4;
 /// The same to first order, as a share of that.
-const LITTLE: f64 = 0.25;
+const FIRST_ORDER_SHARE: f64 = 0.25;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
 /// Maximum number of further fits in [`PreparedSession::fit_on`], each from the end of the fit before.
@@ -177,7 +177,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             // little to first order need not be tried, nor any that is damped more.
             let found = (lightest.saturating_sub(1)..DAMPING.len())
                 .filter_map(|d| Some((d, equations.step(DAMPING[d])?)))
-                .take_while(|(_, step)| step.gain > LITTLE * fitted.enough())
+                .take_while(|(_, step)| step.gain > FIRST_ORDER_SHARE * fitted.enough())
                 .find_map(|(d, step)| Some((d, next(&step)?)));
             let Some((damping, next)) = found else {
                 if old {

@@ -43,7 +43,7 @@ pub struct OpenSpan {
 const PIECE: f64 = 1.0;
 /// Share by which a gap may exceed its floor whatever that is uncertain by: what the robot does between its samples, and numbers that are
 /// estimates.
-const TOLERATED: f64 = 0.1;
+const TOLERATED_EXCESS: f64 = 0.1;
 /// Standard normal quantile of the test's level, 0.001 for each channel.
 const LEVEL: f64 = 3.09;
 /// Ratio to its floor above which a gap counts as clear,
@@ -117,7 +117,7 @@ fn channel(trials: &[TrialResidual], c: usize) -> HeldOutGap {
         open: missing.map(open_everywhere),
     };
     if let Some(size) = size {
-        let ratio = size / (floor * (1.0 + TOLERATED));
+        let ratio = size / (floor * (1.0 + TOLERATED_EXCESS));
         let plain = size > floor * f64::max(OPEN_GAP, 1.0 + UNCERTAIN * libm::sqrt(relative));
         let beyond_chance = fisher(ratio * ratio, own.max(1.0), freedom.all) > LEVEL;
         if gap.open.is_none() && (plain || beyond_chance) {
@@ -239,7 +239,7 @@ fn mean<'p>(pieces: impl Iterator<Item = &'p Piece>) -> Option<f64> {
 
 /// The run of pieces that exceeds the floor by most, and by how much.
 fn worst(trial: usize, pieces: &[Piece], floor: f64) -> Option<(f64, OpenSpan)> {
-    let allowed = floor * (1.0 + TOLERATED) * (1.0 + TOLERATED);
+    let allowed = floor * (1.0 + TOLERATED_EXCESS) * (1.0 + TOLERATED_EXCESS);
     let mut best: Option<(f64, usize, usize)> = None;
     let (mut sum, mut start) = (0.0, 0);
     for (i, piece) in pieces.iter().enumerate() {

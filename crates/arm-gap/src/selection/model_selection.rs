@@ -38,7 +38,7 @@ const CLEAR_EXCHANGES: usize = 16;
 /// resembles another effect.
 const ELSEWHERE: f64 = 0.25;
 /// The same of what swings there: it has one frequency and is alike in every movement, and what a law misses is neither.
-const SWINGING: f64 = 0.05;
+const ELSEWHERE_OSCILLATING: f64 = 0.05;
 
 /// What an effect may explain, as a sum of squares, without being there: what the law of another one misses of what it shows.
 ///
@@ -53,7 +53,7 @@ fn mimicked(effect: &Effect<f64>, by: &Effect<f64>, gain: f64) -> f64 {
     let part = match (is_near, effect.kind.prior().nature.swings()) {
         (true, _) => 1.0,
         (false, false) => ELSEWHERE,
-        (false, true) => SWINGING,
+        (false, true) => ELSEWHERE_OSCILLATING,
     };
     by.kind.prior().squared_law_error * gain * part
 }

@@ -17,7 +17,9 @@ use crate::fitting::precision::Precision;
 use crate::hypothesis::{Hypothesis, Target};
 use crate::prepared_session::PreparedSession;
 use crate::selection::model_selection::{FittedAlternative, MissingEffect, TIE};
-use crate::selection::passive_base_evidence::{ODDS, STAYS, Term, crossed_joints, least_of};
+use crate::selection::passive_base_evidence::{
+    LEAST_GAIN_TO_KEEP, ODDS, Term, crossed_joints, least_of,
+};
 use crate::selection::search_state::Settled;
 use crate::sensitivity::linearization_point::LinearizationPoint;
 
@@ -133,7 +135,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for _ in 0..TURNS {
             let terms = self.base_terms(&settled.1, &settled.0)?;
             self.start = Some(settled.0.hypothesis.clone());
-            if !self.dropped_weak(&terms, |_, _| STAYS) {
+            if !self.dropped_weak(&terms, |_, _| LEAST_GAIN_TO_KEEP) {
                 break;
             }
             self.read_anew()?;
@@ -181,7 +183,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             let terms = self.base_terms(&point, &fitted)?;
             let crossed = crossed_joints::<N>(&fitted.hypothesis.named);
-            if !self.dropped_weak(&terms, |_, law| least_of(&law.effect, &crossed, STAYS)) {
+            if !self.dropped_weak(&terms, |_, law| {
+                least_of(&law.effect, &crossed, LEAST_GAIN_TO_KEEP)
+            }) {
                 let back = std::iter::zip(&before, &self.dropped).any(|(was, is)| *was && !is);
                 if (back || is_bent) && fitted.cost + fitted.enough() < current.cost {
                     return Ok(Some((fitted, point)));

@@ -7,9 +7,9 @@ use crate::data::passive_law::Passive;
 use crate::selection::friction_at_rest::TRIED_AT_REST;
 
 /// Square of the standard deviations from zero beyond which a law stays once it was refitted by simulation, 2,
-pub(super) const STAYS: f64 = 4.0;
+pub(super) const LEAST_GAIN_TO_KEEP: f64 = 4.0;
 /// and what it must gain at least to be named, 3: with nine such laws an arm without any has a false name in one of eighty sessions.
-const NAMED: f64 = 9.0;
+const LEAST_GAIN_TO_NAME: f64 = 9.0;
 /// Prior odds of a law that every passive joint has against one that few have, in units of twice the log-likelihood: odds of 20.
 pub(super) const ODDS: f64 = 6.0;
 
@@ -35,7 +35,7 @@ impl Term {
         let typical = law.free.iter().find(|f| f.parameter == 0).map(|f| f.sd);
         // The Bayes factor of a half-normal density of that width, to Laplace's approximation.
         let likelier = typical.map_or(0.0, |width| 2.0 * libm::log(0.5 * width / self.sd));
-        f64::max(NAMED, likelier) + 2.0 * libm::log(tried)
+        f64::max(LEAST_GAIN_TO_NAME, likelier) + 2.0 * libm::log(tried)
     }
 }
 
@@ -77,11 +77,17 @@ mod tests {
         let crossed = crossed_joints::<3>(&[of(Kind::Biarticular, 1), of(Kind::EndRange, 2)]);
         assert_eq!(crossed, [true, true, false]);
         assert_eq!(
-            least_of(&of(Kind::Elastic, 0), &crossed, NAMED),
+            least_of(&of(Kind::Elastic, 0), &crossed, LEAST_GAIN_TO_NAME),
             f64::MIN_POSITIVE
         );
-        assert_eq!(least_of(&of(Kind::Elastic, 2), &crossed, NAMED), NAMED);
-        assert_eq!(least_of(&of(Kind::Viscous, 0), &crossed, NAMED), NAMED);
+        assert_eq!(
+            least_of(&of(Kind::Elastic, 2), &crossed, LEAST_GAIN_TO_NAME),
+            LEAST_GAIN_TO_NAME
+        );
+        assert_eq!(
+            least_of(&of(Kind::Viscous, 0), &crossed, LEAST_GAIN_TO_NAME),
+            LEAST_GAIN_TO_NAME
+        );
     }
 
     #[test]
@@ -100,10 +106,12 @@ mod tests {
             .least_to_be_named(&law(kind, 1.0))
         };
         // At 3 and at √(2 ln 500) standard deviations.
-        assert_eq!(least(Kind::Viscous, 0.1), NAMED);
+        assert_eq!(least(Kind::Viscous, 0.1), LEAST_GAIN_TO_NAME);
         assert!((least(Kind::Viscous, 1e-3) - 12.43).abs() < 0.01);
         // Of dry friction, eight speeds are tried.
-        assert!((least(Kind::Coulomb, 0.1) - NAMED - 2.0 * libm::log(8.0)).abs() < 1e-12);
+        assert!(
+            (least(Kind::Coulomb, 0.1) - LEAST_GAIN_TO_NAME - 2.0 * libm::log(8.0)).abs() < 1e-12
+        );
         // Where the limit is the one of likelihood, the half-normal density and the likelihood have equal areas: by sums over sizes.
         let (sd, width) = (1e-3, 1.0);
         let found = sd * least(Kind::Viscous, sd).sqrt();
@@ -119,9 +127,9 @@ mod tests {
     /// Of nine laws, each with a first parameter that is not negative, chance names one in 80 sessions; a rare law has odds of 20 against it.
     #[test]
     fn limits_have_the_probabilities_that_they_stand_for() {
-        let false_name = 9.0 * 0.5 * chi_square_tail(NAMED, 1);
+        let false_name = 9.0 * 0.5 * chi_square_tail(LEAST_GAIN_TO_NAME, 1);
         assert!((1.0 / false_name - 82.0).abs() < 2.0, "{false_name}");
         assert!((libm::exp(0.5 * ODDS) - 20.0).abs() < 0.5);
-        assert_eq!(libm::sqrt(STAYS), 2.0);
+        assert_eq!(libm::sqrt(LEAST_GAIN_TO_KEEP), 2.0);
     }
 }
