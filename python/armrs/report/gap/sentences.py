@@ -234,6 +234,18 @@ def heading(data: Mapping[str, Any]) -> str:
     return "What comes nearest to what is missing" if headline.only_near(data) else "Missing from the model"
 
 
+def _printed(given: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:
+    """Return the parameters that say what a law is: those that are fitted, else those that are not zero, else all.
+
+    An end-range moment is printed with its angle (`upper` with `upper_moment`); the angle of a moment of zero has no meaning.
+    """
+    moments = {name: given.get(f"{name}_moment") for name in given}
+    placed = {name: value for name, value in given.items() if (moment := moments[name]) is None or moment["value"]}
+    if any(value["std"] is not None for value in given.values()):
+        return {name: value for name, value in given.items() if value["std"] is not None or (moments[name] and name in placed)}
+    return {name: value for name, value in placed.items() if value["value"]} or given
+
+
 def missing(data: Mapping[str, Any]) -> Table:
     """Return the named effects with their estimates."""
     rows: list[list[object]] = []
@@ -244,14 +256,7 @@ def missing(data: Mapping[str, Any]) -> Table:
         if repeated:
             without = effect.get("without")
             alone = "–" if without is None else digits(without, 2)
-        given = effect["parameters"]
-        # An end-range moment is printed with its angle (`upper` with `upper_moment`); the angle of a moment of zero has no meaning.
-        moments = {name: given.get(f"{name}_moment") for name in given}
-        placed = {name for name, moment in moments.items() if moment is None or moment["value"]}
-        fitted = {n: v for n, v in given.items() if v["std"] is not None or (moments[n] and n in placed)}
-        fitted = fitted if any(v["std"] is not None for v in fitted.values()) else {}
-        used = {n: v for n, v in given.items() if v["value"] and n in placed}  # a parameter of zero is one that the law does without
-        for k, (name, value) in enumerate((fitted or used or effect["parameters"]).items()):
+        for k, (name, value) in enumerate(_printed(effect["parameters"]).items()):
             head = [effect["kind"], place, alone] if k == 0 else ["", "", ""]
             factor, held_in = formatting.read_in(value["unit"])
             std = value["std"] and factor * value["std"]
