@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,7 +16,7 @@ from armrs.analysis.torque_balance import motion_of, unexplained
 from armrs.cli import main
 from armrs.io import column_conventions
 from armrs.io.samples import read_samples, write_samples
-from armrs.workflows.setup_check import examine_setup
+from armrs.workflows.setup_check import examine_setup, first_wrong
 
 Table = dict[str, np.ndarray]
 
@@ -70,7 +71,7 @@ WRONG: dict[str, tuple[Callable[[Table], Table], str]] = {
     "from the vertical": (angles(lambda q: q + np.array([np.pi / 2, 0.0, 0.0])), "(from the vertical downwards?)"),
     "another zero": (angles(lambda q: q + np.array([0.0, 0.6, 0.0])), "(another zero: q2 is 0."),
     "forces swapped": (lambda t: t | {"Fy_N": t["Fz_N"], "Fz_N": t["Fy_N"]}, "(swapped columns?)"),
-    "kN": (lambda t: t | {"Fy_N": 1e-3 * t["Fy_N"], "Fz_N": 1e-3 * t["Fz_N"]}, "(kN labelled as N?)"),
+    "kN": (lambda t: t | {"Fy_N": 1e-3 * t["Fy_N"], "Fz_N": 1e-3 * t["Fz_N"]}, "(kN labelled as N, or N as mN?)"),
     "ms": (lambda t: t | {"t_s": 1e3 * t["t_s"]}, "(milliseconds?)"),
     "seconds as ms": (
         lambda t: {"t_ms" if name == "t_s" else name: values for name, values in t.items()},
@@ -117,6 +118,26 @@ def test_check_names_a_wrong_setup_and_the_one_trial_that_is_wrong(session: Path
     shutil.copy(tmp_path / "swapped.csv", tmp_path / "one" / "trials" / "round_2.csv")
     texts = [p.text for p in armrs.check_dataset(tmp_path / "one").problems if "swapped columns" in p.text]
     assert [text.partition(":")[0] for text in texts] == ["trials/round_2.csv"]
+
+
+@pytest.mark.parametrize("session", ["without"], indirect=True)
+@pytest.mark.parametrize("wrong", [(2,), (1, 2, 3)])
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(("factor", "says"), [(1e3, "(mN labelled as N, or N as kN?)"), (1e-3, "(kN labelled as N, or N as mN?)")])
+def test_one_component_in_another_unit_is_named(session: Path, wrong: tuple[int, ...], axis: int, factor: float, says: str) -> None:
+    """Kilonewtons in one column of one trial passed `check`, and `identify` ended with a residual of 718 N m and status 0."""
+    data = armrs.load_dataset(session)
+    trials = list(data.trials)
+    assert len(trials) == 3
+    for number in wrong:
+        force = trials[number - 1].force_on_arm
+        assert force is not None
+        scaled = force * np.where(np.arange(2) == axis, factor, 1.0)
+        trials[number - 1] = dataclasses.replace(trials[number - 1], force_on_arm=scaled)
+    found = first_wrong(data.model, trials, met=False)
+    name = ("Fy", "Fz")[axis]
+    assert found is not None and f"trials/round_{wrong[0]}.csv" in str(found)
+    assert f"column {name}: found " in str(found) and f"{name} in the unit of its column {says}" in str(found)
 
 
 def every_reading() -> Iterator[column_conventions.AlternativeConvention]:

@@ -57,8 +57,8 @@ FORCES = {
     "Fy reversed": ([[-1.0, 0.0], [0.0, 1.0]], "column Fy"),
     "Fz reversed": ([[1.0, 0.0], [0.0, -1.0]], "column Fz"),
     "other body": ([[-1.0, 0.0], [0.0, -1.0]], "force_on: found "),
-    "kN": ([[1e-3, 0.0], [0.0, 1e-3]], "(kN labelled as N?)"),
-    "mN": ([[1e3, 0.0], [0.0, 1e3]], "(mN labelled as N?)"),
+    "kN": ([[1e-3, 0.0], [0.0, 1e-3]], "(kN labelled as N, or N as mN?)"),
+    "mN": ([[1e3, 0.0], [0.0, 1e3]], "(mN labelled as N, or N as kN?)"),
 }
 UNDECIDED = {
     "MuJoCo, three segments": {"wrist by 90 degrees", "wrist by 180 degrees", "wrist alone mirrored"},

@@ -46,7 +46,7 @@ SETUPS: dict[str, tuple[Change, str]] = {
     "absolute": (angles(lambda q: np.cumsum(q, axis=1)), "(absolute angles?)"),
     "from the vertical": (offset(0, np.pi / 2), "(from the vertical downwards?)"),
     "forces swapped": (forces(lambda force: force[:, ::-1]), "(swapped columns?)"),
-    "kN": (forces(lambda force: 1e-3 * force), "(kN labelled as N?)"),
+    "kN": (forces(lambda force: 1e-3 * force), "(kN labelled as N, or N as mN?)"),
     "zero of the shoulder off by 0.3 rad": (offset(0, 0.3), "(another zero: q1 is "),
     "of the elbow by 0.5 rad": (offset(1, 0.5), "(another zero: q2 is "),
     "of the last joint by 1 rad": (offset(-1, 1.0), "(another zero: q"),

@@ -61,7 +61,9 @@ class Motion:
     def read_as(self, reading: AlternativeConvention) -> Motion:
         """Return the motion in another reading of its columns."""
         turn = reading.turn.T
-        scale = float(np.sqrt(abs(np.linalg.det(reading.force))))
+        # The moment has the unit of the forces, if these share one.
+        first, second = np.linalg.norm(reading.force, axis=1)
+        scale = float(first) if first == second else 1.0
         return Motion(
             reading.angles(self.q), self.speed @ turn, self.acceleration @ turn, self.force @ reading.force.T, scale * self.moment
         )

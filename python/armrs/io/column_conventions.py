@@ -13,6 +13,10 @@ _MOST_SWAPPED = 4
 _DEGREE = float(np.radians(1.0))
 _SAME = 1e-3
 """Angles that differ by no more are read alike [rad]."""
+TOO_SMALL, TOO_LARGE = "kN labelled as N, or N as mN?", "mN labelled as N, or N as kN?"
+"""What makes forces a thousand times too small, or too large."""
+_BESIDE = 30.0
+"""A component of the force is read in another unit where it is so many times the other one, or so many times less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +109,8 @@ def of_forces(n: int) -> Iterator[AlternativeConvention]:
     """Give forces in another unit, order or direction."""
     for place, allowed, force in (
         ("columns Fy, Fz", "Fy along the horizontal, Fz up (swapped columns?)", [[0.0, 1.0], [1.0, 0.0]]),
-        ("columns Fy, Fz", "forces in the unit of their column (kN labelled as N?)", [[1e3, 0.0], [0.0, 1e3]]),
-        ("columns Fy, Fz", "forces in the unit of their column (mN labelled as N?)", [[1e-3, 0.0], [0.0, 1e-3]]),
+        ("columns Fy, Fz", f"forces in the unit of their column ({TOO_SMALL})", [[1e3, 0.0], [0.0, 1e3]]),
+        ("columns Fy, Fz", f"forces in the unit of their column ({TOO_LARGE})", [[1e-3, 0.0], [0.0, 1e-3]]),
         ("force_on", '"arm" or "robot", whichever the force acts on (the other one?)', [[-1.0, 0.0], [0.0, -1.0]]),
         ("column Fy", "Fy along the horizontal, forward (a reversed axis?)", [[-1.0, 0.0], [0.0, 1.0]]),
         ("column Fz", "Fz up (a reversed axis?)", [[1.0, 0.0], [0.0, -1.0]]),
@@ -114,6 +118,19 @@ def of_forces(n: int) -> Iterator[AlternativeConvention]:
         ("columns Fy, Fz", "Fy along the horizontal, Fz up (axes turned by -90°?)", [[0.0, 1.0], [-1.0, 0.0]]),
     ):
         yield AlternativeConvention(place, allowed, np.eye(n), np.zeros(n), np.array(force))
+
+
+def of_unit_of_one_force(force: np.ndarray, n: int) -> Iterator[AlternativeConvention]:
+    """Give one component of forces, (n_samples, 2), in another unit, where it is very large or small beside the other; `n` joints."""
+    sizes = np.sqrt(np.mean(force**2, axis=0))
+    for c, name in enumerate(("Fy", "Fz")):
+        own, other = sizes[c], sizes[1 - c]
+        for found, factor, mistake in ((own > _BESIDE * other, 1e-3, TOO_LARGE), (_BESIDE * own < other, 1e3, TOO_SMALL)):
+            if found and own > 0.0:
+                scaled = np.diag([factor if axis == c else 1.0 for axis in (0, 1)])
+                yield AlternativeConvention(
+                    f"column {name}", f"{name} in the unit of its column ({mistake})", np.eye(n), np.zeros(n), scaled
+                )
 
 
 def other_zero(n: int, joint: int, offset: float, *, still: bool = False) -> AlternativeConvention:

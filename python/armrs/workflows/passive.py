@@ -295,9 +295,11 @@ def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[Tr
                 direction = kept[k].direction.copy()
                 direction[found.samples, joint] = 0
                 kept[k] = dataclasses.replace(kept[k], direction=direction)
+                first = "the first cycle" if found.cycles == 1 else f"the first {found.cycles} cycles"
+                energy = "dissipates" if found.cycles == 1 else "dissipate"
                 lines.append(
-                    f"{trials[k].trial.file}: the first {'cycle' if found.cycles == 1 else f'{found.cycles} cycles'} of joint {joint + 1} "
-                    f"dissipate {100 * found.more:.0f} % more than later ones: left out as preconditioning"
+                    f"{trials[k].trial.file}: {first} of joint {joint + 1} {energy} {100 * found.more:.0f} % more than later ones: "
+                    "left out as preconditioning"
                 )
     return tuple(kept), lines
 

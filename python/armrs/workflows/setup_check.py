@@ -219,7 +219,9 @@ def _unproved(model: Model, motion: Motion, *, met: bool) -> list[str]:
 def _ranked(model: Model, motion: Motion, met: bool) -> list[tuple[float, AlternativeConvention]]:
     """Return what every other reading leaves, the least first; of the forces alone where the angles are known to be right."""
     n = model.n_joints
-    asked = [*column_conventions.of_forces(n)] if met else [*column_conventions.of_angles(n), *column_conventions.of_forces(n)]
+    asked = [*column_conventions.of_forces(n), *column_conventions.of_unit_of_one_force(motion.force, n)]
+    if not met:
+        asked = [*column_conventions.of_angles(n), *asked]
     return sorted(((unexplained(model, motion.read_as(r)), r) for r in asked if r.differs(motion.q)), key=lambda item: item[0])
 
 

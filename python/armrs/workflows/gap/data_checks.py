@@ -10,6 +10,7 @@ import numpy as np
 from ... import _armrs
 from ..._armrs import SimulatedTrial
 from ...errors import BadInput, Text
+from ...io.column_conventions import TOO_LARGE, TOO_SMALL
 from ...io.dataset import Dataset
 from ...io.plausibility import mean_gap, refuse_implausible
 from ...io.trial import Trial, constant
@@ -307,10 +308,10 @@ def _repeats(forces: np.ndarray, other: np.ndarray) -> bool:
 def _refuse_units(forces: np.ndarray, expected: np.ndarray, at: str = "") -> None:
     """Refuse forces, (n_samples, 2), that are those expected of the arm in another unit."""
     size, usual = np.sqrt(np.mean(forces**2)), np.sqrt(np.mean(expected**2))
-    for factor, unit in ((1000.0, "mN labelled as N"), (0.001, "kN labelled as N")):
+    for factor, mistake in ((1000.0, TOO_LARGE), (0.001, TOO_SMALL)):
         if usual > 0 and abs(np.log10(size / usual / factor)) < 0.5:
             found = f"{size:.3g} N on average where the model expects {usual:.3g} N"
-            raise BadInput(f"{at}Fy_N, Fz_N", Text(found), f"forces in newtons ({unit}?)")
+            raise BadInput(f"{at}Fy_N, Fz_N", Text(found), f"forces in the unit of their column ({mistake})")
 
 
 def _refuse_directions(dataset: Dataset, forces: np.ndarray, expected: np.ndarray, at: str = "") -> None:
