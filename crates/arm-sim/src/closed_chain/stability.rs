@@ -83,17 +83,20 @@ pub fn longest_step<const N: usize>(chain: &Chain<f64, N>, effect: &Effect<f64>)
 /// Longest step with which the fourth-order method keeps the vibration of an arm on a compliant contact from growing \[s\].
 ///
 /// * `setup` - the rig
-/// * `q` - the pose at which it is judged \[rad\]
+/// * `poses` - at which it is judged \[rad\]: a contact that is stiff in one direction is felt in some poses only
 ///
 /// # Errors
 /// [`SimulationError`] for a rig that cannot be simulated.
-pub fn longest_step_on_contact<const N: usize>(
+pub fn longest_step_on_contact<'a, const N: usize>(
     setup: &Setup<f64, N>,
-    q: &Joints<f64, N>,
+    poses: impl IntoIterator<Item = &'a Joints<f64, N>>,
 ) -> Result<f64, SimulationError> {
     let contact = setup.contact;
     let model = Model::new(setup, Link::Compliant(contact), Vec::new())?;
-    Ok(Vibration::at(&contact, &model, q).largest_step(Integrator::Rk4))
+    let steps = poses
+        .into_iter()
+        .map(|q| Vibration::at(&contact, &model, q).largest_step(Integrator::Rk4));
+    Ok(steps.fold(f64::INFINITY, f64::min))
 }
 
 /// Refuses a contact that is too stiff for the step, judged at one pose.
