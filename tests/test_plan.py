@@ -181,7 +181,7 @@ def test_the_verb(session: object, tmp_path: Path, capsys: pytest.CaptureFixture
     [
         (["--angles-deg=-80:-10"], "angles: found 1 ranges, allowed 2, one a joint"),
         (["--angles-deg=-80,20:110"], "--angles-deg: found '-80', allowed LOW:HIGH in degrees"),
-        (["--angles-deg=-10:-80,20:110"], "angles of joint 1: found -0.174533 to -1.39626 rad, allowed the smaller angle first"),
+        (["--angles-deg=-10:-80,20:110"], "--angles-deg: found '-10:-80', allowed the smaller angle first"),
         (["--angles-deg=-80:-10,20:110", "--speed-rad-s", "nan"], "--speed-rad-s: found nan"),
         (["--angles-deg=-80:-10,20:110", "--robot-acceleration-rad-s2", "0"], "--robot-acceleration-rad-s2: found 0"),
         (
@@ -231,6 +231,11 @@ def test_a_movement_that_cannot_be_made_is_refused_with_its_file(
         error = capsys.readouterr().err
         assert f"{place}{message}" in error and error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_range_of_an_angle_begins_with_the_smaller_one() -> None:
+    with pytest.raises(BadInput, match=r"^angles of joint 1: found 0\.5 to -0\.5 rad, allowed the smaller angle first$"):
+        armrs.plan(check_plan.truth(), Limits(((0.5, -0.5), (0.0, 1.0))), evaluations=1)
 
 
 def test_limits_that_nothing_respects_are_said() -> None:
