@@ -122,15 +122,16 @@ def of_forces(n: int) -> Iterator[AlternativeConvention]:
 
 def of_unit_of_one_force(force: np.ndarray, n: int) -> Iterator[AlternativeConvention]:
     """Give one component of forces, (n_samples, 2), in another unit, where it is very large or small beside the other; `n` joints."""
-    sizes = np.sqrt(np.mean(force**2, axis=0))
-    for c, name in enumerate(("Fy", "Fz")):
-        own, other = sizes[c], sizes[1 - c]
-        for found, factor, mistake in ((own > _BESIDE * other, 1e-3, TOO_LARGE), (_BESIDE * own < other, 1e3, TOO_SMALL)):
-            if found and own > 0.0:
-                scaled = np.diag([factor if axis == c else 1.0 for axis in (0, 1)])
-                yield AlternativeConvention(
-                    f"column {name}", f"{name} in the unit of its column ({mistake})", np.eye(n), np.zeros(n), scaled
-                )
+    less, more = np.argsort(sizes := np.sqrt(np.mean(force**2, axis=0)))
+    if sizes[more] <= _BESIDE * sizes[less]:
+        return
+    # A component that is zero is so in every unit.
+    for axis, factor, mistake in ((more, 1e-3, TOO_LARGE), (less, 1e3, TOO_SMALL))[: np.count_nonzero(sizes)]:
+        name, scales = ("Fy", "Fz")[axis], np.ones(2)
+        scales[axis] = factor
+        yield AlternativeConvention(
+            f"column {name}", f"{name} in the unit of its column ({mistake})", np.eye(n), np.zeros(n), np.diag(scales)
+        )
 
 
 def other_zero(n: int, joint: int, offset: float, *, still: bool = False) -> AlternativeConvention:

@@ -295,11 +295,10 @@ def _without_preconditioning(trials: tuple[TrialMoments, ...]) -> tuple[tuple[Tr
                 direction = kept[k].direction.copy()
                 direction[found.samples, joint] = 0
                 kept[k] = dataclasses.replace(kept[k], direction=direction)
-                first = "the first cycle" if found.cycles == 1 else f"the first {found.cycles} cycles"
-                energy = "dissipates" if found.cycles == 1 else "dissipate"
+                cycles, lose = ("cycle", "dissipates") if found.cycles == 1 else (f"{found.cycles} cycles", "dissipate")
                 lines.append(
-                    f"{trials[k].trial.file}: {first} of joint {joint + 1} {energy} {100 * found.more:.0f} % more than later ones: "
-                    "left out as preconditioning"
+                    f"{trials[k].trial.file}: the first {cycles} of joint {joint + 1} {lose} {100 * found.more:.0f} % more than later "
+                    "ones: left out as preconditioning"
                 )
     return tuple(kept), lines
 

@@ -352,7 +352,7 @@ def angles_of(text: str) -> tuple[tuple[float, float], ...]:
             low, high = (float(np.radians(float(end))) for end in ends)
         except ValueError:
             raise BadInput("--angles-deg", part, "LOW:HIGH in degrees for each joint, such as -80:-10,20:110") from None
-        if low > high:
+        if low >= high:
             raise BadInput("--angles-deg", part, "the smaller angle first, as LOW:HIGH")
         ranges.append((low, high))
     return tuple(ranges)

@@ -240,10 +240,9 @@ def _printed(given: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str
     An end-range moment is printed with its angle (`upper` with `upper_moment`); the angle of a moment of zero has no meaning.
     """
     moments = {name: given.get(f"{name}_moment") for name in given}
-    placed = {name: value for name, value in given.items() if (moment := moments[name]) is None or moment["value"]}
     if any(value["std"] is not None for value in given.values()):
-        return {name: value for name, value in given.items() if value["std"] is not None or (moments[name] and name in placed)}
-    return {name: value for name, value in placed.items() if value["value"]} or given
+        return {name: value for name, value in given.items() if value["std"] is not None or ((m := moments[name]) and m["value"])}
+    return {name: value for name, value in given.items() if value["value"] and ((m := moments[name]) is None or m["value"])} or given
 
 
 def missing(data: Mapping[str, Any]) -> Table:
