@@ -21,7 +21,8 @@ fn cascade(c: &mut Criterion) {
                 stream
                     .push(black_box(&q), black_box(&force))
                     .expect("finite samples");
-                stream.finish().solve(&model, 3.0).expect("a solution")
+                let condensed = stream.finish().expect("finite samples");
+                condensed.solve(&model, 3.0).expect("a solution")
             });
         });
     }

@@ -428,8 +428,8 @@ fn cascade(q: &[Joints<f64, 3>], force: &[Plane<f64>]) -> Cascade<3> {
     };
     let mut stream = Stream::new(&model.chain);
     stream.push(q, force).expect("finite samples");
-    stream
-        .finish()
+    let condensed = stream.finish().expect("finite samples");
+    condensed
         .solve(&model, KNOWN_WITHIN / WEAK)
         .expect("a solution")
 }

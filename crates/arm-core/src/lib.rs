@@ -53,6 +53,7 @@ pub use dynamics::kinematics::{Pose, jacobian, jacobian_rate, joint_position, ti
 pub use dynamics::products::Products;
 pub use dynamics::regressor::{Regressor, regressor};
 pub use error::{Invalid, Shown};
+pub use numeric::float::write_sines_and_cosines;
 pub use numeric::lanes::Lanes;
 pub use numeric::scalar::{Real, Scalar};
 #[cfg(feature = "simd")]

@@ -3,8 +3,8 @@
 use crate::numeric::scalar::{Real, Scalar};
 use crate::numeric::transcendental::{
     DOUBLE, LARGEST_ANGLES, LARGEST_REDUCED, LEAST_EXPONENT, SATURATED, SINGLE, exp_within,
-    far_reduced_sin_cos, far_reduced_sin_cos_single, reduced_sin_cos, tanh_within, turned,
-    turned_single,
+    expected_sin_cos, far_reduced_sin_cos, far_reduced_sin_cos_single, reduced_sin_cos,
+    tanh_within, turned, turned_single,
 };
 
 /// Square roots of the processor where it has them: the compiler recognises these two names, and takes the instruction or the
@@ -58,6 +58,26 @@ impl Real for f32 {
     #[inline]
     fn whole(self) -> u32 {
         self as u32
+    }
+}
+
+/// Sines and cosines of many angles \[rad\]. In one pass without a branch, which the compiler makes for several at once where it can.
+///
+/// # Panics
+/// Where `sines` or `cosines` are fewer than the angles.
+#[inline(always)]
+pub fn write_sines_and_cosines(angles: &[f64], [sines, cosines]: [&mut [f64]; 2]) {
+    let count = angles.len();
+    let (sines, cosines) = (&mut sines[..count], &mut cosines[..count]);
+    let mut within = true;
+    for i in 0..count {
+        (sines[i], cosines[i]) = turned(reduced_sin_cos(angles[i], &DOUBLE));
+        within &= f64::abs(angles[i]) <= LARGEST_REDUCED;
+    }
+    if !within {
+        for i in 0..count {
+            (sines[i], cosines[i]) = Scalar::sin_cos(angles[i]);
+        }
     }
 }
 
@@ -127,27 +147,15 @@ impl Scalar for f64 {
     #[cfg_attr(not(target_os = "none"), inline)]
     fn sin_cos(self) -> (Self, Self) {
         if self.abs() <= LARGEST_REDUCED {
-            turned(reduced_sin_cos(self, &DOUBLE))
+            // A device takes every instruction in turn, and has little room for them.
+            if cfg!(target_os = "none") {
+                turned(reduced_sin_cos(self, &DOUBLE))
+            } else {
+                expected_sin_cos(self)
+            }
         } else {
             far_sin_cos(self)
         }
-    }
-    /// In one pass without a branch, which the compiler makes for several at once where it can.
-    #[cfg(not(target_os = "none"))]
-    #[inline(always)]
-    fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
-        let [mut sines, mut cosines] = [[0.0; K]; 2];
-        let mut within = true;
-        for i in 0..K {
-            (sines[i], cosines[i]) = turned(reduced_sin_cos(angles[i], &DOUBLE));
-            within &= f64::abs(angles[i]) <= LARGEST_REDUCED;
-        }
-        if !within {
-            for i in 0..K {
-                (sines[i], cosines[i]) = Scalar::sin_cos(angles[i]);
-            }
-        }
-        [sines, cosines]
     }
     #[inline]
     fn exp(self) -> Self {

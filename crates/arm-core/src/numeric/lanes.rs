@@ -2,6 +2,7 @@
 
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+use crate::numeric::float::write_sines_and_cosines;
 use crate::numeric::scalar::Scalar;
 use crate::numeric::transcendental::{exp, tanh};
 
@@ -106,9 +107,23 @@ impl<const L: usize> Scalar for Lanes<L> {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        // One loop over lanes and not lanes within each operation: the compiler then uses the widest vectors.
-        let [sin, cos] = f64::sines_and_cosines(&self.0);
-        (Self(sin), Self(cos))
+        let [[sin], [cos]] = Self::sines_and_cosines(&[self]);
+        (sin, cos)
+    }
+    /// One loop over all lanes of all angles: long enough for the compiler to keep it a loop, of which it makes the widest vectors.
+    #[inline(always)]
+    fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
+        let (mut all, mut sines, mut cosines) = ([[0.0; L]; K], [[0.0; L]; K], [[0.0; L]; K]);
+        for k in 0..K {
+            all[k] = angles[k].0;
+        }
+        let found = [sines.as_flattened_mut(), cosines.as_flattened_mut()];
+        write_sines_and_cosines(all.as_flattened(), found);
+        let mut lanes = [[Self::ZERO; K]; 2];
+        for k in 0..K {
+            (lanes[0][k], lanes[1][k]) = (Self(sines[k]), Self(cosines[k]));
+        }
+        lanes
     }
     #[inline(always)]
     fn exp(self) -> Self {

@@ -1,7 +1,7 @@
 //! The numbers that the core computes with: scalars, SIMD lanes, transcendental functions, covariances.
 
 pub(crate) mod covariance;
-mod float;
+pub(crate) mod float;
 pub(crate) mod lanes;
 pub(crate) mod scalar;
 #[cfg(feature = "simd")]

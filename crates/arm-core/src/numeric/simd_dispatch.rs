@@ -4,11 +4,27 @@
 //! fused, so the bits are the same; only more numbers go through one instruction.
 
 pub use pulp::NullaryFnOnce as Computation;
+pub use pulp::{Simd, WithSimd};
 
-/// Computes, with the vectors that this processor has.
+/// Computes, with the vectors that this processor has: a [`Computation`], whose loops the compiler makes wide, or a [`WithSimd`], which
+/// names its vectors.
 ///
 /// Only what is inlined is compiled for them: `call`, and all that it calls and that counts, is `#[inline(always)]`.
 #[inline(always)]
-pub fn dispatch<C: Computation>(computation: C) -> C::Output {
+pub fn dispatch<C: WithSimd>(computation: C) -> C::Output {
     pulp::Arch::new().dispatch(computation)
+}
+
+/// Whether a register of the processor holds eight numbers, those of AVX-512. Of fewer, one holds four or less, and eight numbers in two
+/// registers leave too few for the rest.
+pub fn has_registers_of_eight() -> bool {
+    struct Width;
+    impl WithSimd for Width {
+        type Output = usize;
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, _: S) -> usize {
+            S::F64_LANES
+        }
+    }
+    dispatch(Width) == 8
 }

@@ -81,6 +81,30 @@ pub(crate) fn reduced_sin_cos<T: Scalar, const S: usize, const C: usize>(
     polynomials(quarters, r, k)
 }
 
+/// Sine and cosine of a single number. The same bits as [`turned`] of [`reduced_sin_cos`], but with branches on the quarter turn: along a
+/// motion it is that of the moment before, and a processor that expects it goes on without waiting for the reduction.
+#[inline]
+pub(crate) fn expected_sin_cos(x: f64) -> (f64, f64) {
+    let k = &DOUBLE;
+    let [first, second, third] = k.half_pi;
+    let quarters = x * core::f64::consts::FRAC_2_PI + ROUND;
+    let n = quarters - ROUND;
+    if n == 0.0 {
+        let Reduced { sin, cos, .. } = polynomials(quarters, x, k);
+        (sin, cos)
+    } else if n == -1.0 {
+        let r = ((x + first) + second) + third;
+        let Reduced { sin, cos, .. } = polynomials(quarters, r, k);
+        (-cos, sin)
+    } else if n == 1.0 {
+        let r = ((x - first) - second) - third;
+        let Reduced { sin, cos, .. } = polynomials(quarters, r, k);
+        (cos, -sin)
+    } else {
+        turned(reduced_sin_cos(x, k))
+    }
+}
+
 /// Sine and cosine of the rest `r` of a reduction, within ±π/4.
 #[inline]
 fn polynomials<T: Scalar, const S: usize, const C: usize>(

@@ -4,7 +4,7 @@
 //! `t_j` the torque `(JᵀF)_j`. The step of joint j needs the columns `1, y_N … y_j`, which lead: its own triangle is a corner of the
 //! common one. No filter, no intervals: use [`crate::cascade`] for these.
 
-use arm_core::{Chain, Joints, Lanes, Plane, Pose, Scalar, static_torque};
+use arm_core::{Chain, Joints, Plane, write_sines_and_cosines};
 
 use crate::cascade::step::bounded;
 use crate::cascade::unknowns::{is_dissipative, own, unknowns};
@@ -18,14 +18,11 @@ use arm_numerics::least_squares::condense::{BLOCK, Column, Condenser};
 use arm_numerics::least_squares::factor::Factor;
 use arm_numerics::linalg::matrix::{Matrix, add_scaled, dot};
 
-/// Samples that are computed with together: two registers of AVX-512, whose operations need not wait for each other.
-const WIDTH: usize = 16;
-
 /// Folds samples as they come. Memory is fixed when it is made; pushing never allocates.
 #[derive(Clone, Debug)]
 pub struct Stream<const N: usize> {
     chain: Chain<f64, N>,
-    wide: Chain<Lanes<WIDTH>, N>,
+    block: Box<Block<N>>,
     condenser: Condenser,
 }
 
@@ -34,18 +31,19 @@ impl<const N: usize> Stream<N> {
     pub fn new(chain: &Chain<f64, N>) -> Self {
         Self {
             chain: *chain,
-            wide: chain.cast(),
+            block: Box::new(Block::empty()),
             condenser: Condenser::new(2 * N),
         }
     }
 
-    /// Adds samples.
+    /// Adds samples. The result does not depend on how they are cut into calls.
     ///
     /// * `q` - joint angles \[rad\]
     /// * `force_on_arm` - at the tip \[N\]
     ///
     /// # Errors
-    /// [`NumericsError::Length`](arm_numerics::NumericsError::Length); [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite), after which the samples before the bad one (or its block) stand.
+    /// [`NumericsError::Length`](arm_numerics::NumericsError::Length); [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite)
+    /// when a block of [`BLOCK`] samples is complete and one of them is bad: the blocks before it stand.
     pub fn push(
         &mut self,
         q: &[Joints<f64, N>],
@@ -54,66 +52,113 @@ impl<const N: usize> Stream<N> {
         check_len("force_on_arm", force_on_arm.len(), q.len())?;
         let (mut q, mut force) = (q, force_on_arm);
         while !q.is_empty() {
-            let wide = &self.wide;
-            if q.len() >= BLOCK
-                && self.condenser.push_panel(|panel| {
-                    dispatch(Fill {
-                        chain: wide,
-                        q: &q[..BLOCK],
-                        force: &force[..BLOCK],
-                        panel,
-                    });
-                })?
-            {
-                (q, force) = (&q[BLOCK..], &force[BLOCK..]);
-                continue;
+            let taken = q.len().min(BLOCK - self.block.samples);
+            let (q_now, q_later) = q.split_at(taken);
+            let (force_now, force_later) = force.split_at(taken);
+            let block = &mut *self.block;
+            dispatch(Take {
+                block,
+                q: q_now,
+                force: force_now,
+            });
+            (q, force) = (q_later, force_later);
+            if self.block.samples == BLOCK {
+                self.fold()?;
             }
-            let (columns, torque) = sample(&self.chain, &q[0], force[0]);
-            // As wide as six segments need.
-            let mut row = [0.0; 16];
-            row[0] = 1.0;
-            for k in 0..N {
-                row[1 + k] = columns[N - 1 - k];
-                row[1 + N + k] = torque[N - 1 - k];
-            }
-            self.condenser.push(&row[..2 * N], row[2 * N])?;
-            (q, force) = (&q[1..], &force[1..]);
         }
         Ok(())
     }
 
     /// The condensed problem of all samples.
-    pub fn finish(self) -> Condensed<N> {
-        Condensed {
+    ///
+    /// # Errors
+    /// [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite) as [`Stream::push`], for the samples of the last block.
+    pub fn finish(mut self) -> Result<Condensed<N>, IdentError> {
+        self.fold()?;
+        Ok(Condensed {
             factor: self.condenser.finish(),
+        })
+    }
+
+    /// Folds the samples that wait.
+    fn fold(&mut self) -> Result<(), IdentError> {
+        let (chain, block) = (&self.chain, &mut *self.block);
+        let samples = core::mem::take(&mut block.samples);
+        self.condenser.push_panel(samples, |panel| {
+            dispatch(Fill {
+                chain,
+                block,
+                panel,
+            });
+        })?;
+        Ok(())
+    }
+}
+
+/// Samples that wait, each quantity in a column of its own, and memory for what follows from them.
+#[derive(Clone, Debug)]
+struct Block<const N: usize> {
+    samples: usize,
+    /// Angles of the links \[rad\].
+    links: [Column; N],
+    /// On the arm \[N\].
+    force: [Column; 2],
+    sin: Column,
+    cos: Column,
+    /// Sums over the links from the tip: torque of the contact, and moment of the weight that lies beside them \[N m\].
+    contact: Column,
+    beside: Column,
+}
+
+impl<const N: usize> Block<N> {
+    fn empty() -> Self {
+        let zeros = Column([0.0; BLOCK]);
+        Self {
+            samples: 0,
+            links: [zeros; N],
+            force: [zeros; 2],
+            sin: zeros,
+            cos: zeros,
+            contact: zeros,
+            beside: zeros,
         }
     }
 }
 
-/// Gravity column of every link \[N m/(kg m)\] and contact torque of every joint \[N m\], known normal moments taken off.
-#[inline(always)]
-fn sample<T: Scalar, const N: usize>(
-    chain: &Chain<T, N>,
-    q: &Joints<T, N>,
-    force: Plane<T>,
-) -> ([T; N], Joints<T, N>) {
-    let pose = Pose::new(q);
-    let [gy, gz] = chain.gravity();
-    let (sin, cos) = (pose.sin(), pose.cos());
-    let mut torque = static_torque(chain, &pose, force, T::ZERO);
-    let mut beyond = T::ZERO;
-    for k in (0..N).rev() {
-        beyond += chain.normal_moments()[k] * (gy * cos[k] + gz * sin[k]);
-        torque[k] -= beyond;
-    }
-    (core::array::from_fn(|k| gy * sin[k] - gz * cos[k]), torque)
-}
-
-/// Writes the columns of a whole panel, several samples at a time.
-struct Fill<'a, const N: usize> {
-    chain: &'a Chain<Lanes<WIDTH>, N>,
+/// Takes samples into a block with room for them.
+struct Take<'a, const N: usize> {
+    block: &'a mut Block<N>,
     q: &'a [Joints<f64, N>],
     force: &'a [Plane<f64>],
+}
+
+impl<const N: usize> Computation for Take<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { block, q, force } = self;
+        let first = block.samples;
+        block.samples += q.len();
+        let places = first..block.samples;
+        for ((place, q), force) in places.zip(q).zip(force) {
+            let mut angle = 0.0;
+            for (link, q) in block.links.iter_mut().zip(q.iter()) {
+                angle += q;
+                link.0[place] = angle;
+            }
+            for (column, force) in block.force.iter_mut().zip(force) {
+                column.0[place] = *force;
+            }
+        }
+    }
+}
+
+/// Writes the columns of a block: gravity column of every link \[N m/(kg m)\] and contact torque of every joint \[N m\], the last first,
+/// with known normal moments taken off. A loop over samples within each quantity: the compiler then uses the widest vectors.
+struct Fill<'a, const N: usize> {
+    chain: &'a Chain<f64, N>,
+    block: &'a mut Block<N>,
     panel: &'a mut [Column],
 }
 
@@ -124,23 +169,26 @@ impl<const N: usize> Computation for Fill<'_, N> {
     fn call(self) {
         let Self {
             chain,
-            q,
-            force,
+            block,
             panel,
         } = self;
-        panel[0].fill(1.0);
-        for (at, (q, force)) in q
-            .chunks_exact(WIDTH)
-            .zip(force.chunks_exact(WIDTH))
-            .enumerate()
-        {
-            let angles = Joints::from_fn(|j, _| Lanes(core::array::from_fn(|l| q[l][j])));
-            let force = core::array::from_fn(|c| Lanes(core::array::from_fn(|l| force[l][c])));
-            let (columns, torque) = sample(chain, &angles, force);
-            let place = at * WIDTH..(at + 1) * WIDTH;
-            for k in 0..N {
-                panel[1 + k][place.clone()].copy_from_slice(&columns[N - 1 - k].0);
-                panel[1 + N + k][place.clone()].copy_from_slice(&torque[N - 1 - k].0);
+        let [gy, gz] = chain.gravity();
+        let ([fy, fz], sin, cos) = (&block.force, &mut block.sin.0, &mut block.cos.0);
+        let (contact, beside) = (&mut block.contact.0, &mut block.beside.0);
+        contact.fill(0.0);
+        beside.fill(0.0);
+        let (ones, panel) = panel.split_at_mut(1);
+        ones[0].0.fill(1.0);
+        let (columns, torques) = panel.split_at_mut(N);
+        for (k, link) in (0..N).rev().enumerate() {
+            write_sines_and_cosines(&block.links[link].0, [&mut sin[..], &mut cos[..]]);
+            let (length, normal) = (chain.segments()[link].length, chain.normal_moments()[link]);
+            let (column, torque) = (&mut columns[k].0, &mut torques[k].0);
+            for i in 0..BLOCK {
+                contact[i] += length * (cos[i] * fz.0[i] - sin[i] * fy.0[i]);
+                beside[i] += normal * (gy * cos[i] + gz * sin[i]);
+                column[i] = gy * sin[i] - gz * cos[i];
+                torque[i] = contact[i] - beside[i];
             }
         }
     }

@@ -9,7 +9,8 @@
 use crate::error::{NumericsError, check_len};
 use crate::least_squares::factor::Factor;
 use crate::linalg::matrix::Matrix;
-use arm_core::simd_dispatch::{Computation, dispatch};
+use arm_core::simd_dispatch::{Computation, Simd, WithSimd, dispatch};
+use core::array::{from_mut, from_ref};
 
 /// Rows in a panel.
 pub const BLOCK: usize = 128;
@@ -23,8 +24,10 @@ pub const LARGEST: f64 = 1e140;
 /// Sums of squares below this are taken as zero, as their inverse would overflow.
 const NOTHING: f64 = 1e-280;
 
-/// One column of a panel.
-pub type Column = [f64; BLOCK];
+/// One column of a panel, where vectors of any width lie within one line of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub struct Column(pub [f64; BLOCK]);
 
 /// Folds rows of a least-squares problem into a triangular factor. Memory is fixed at [`Condenser::new`]; pushing never allocates.
 ///
@@ -59,7 +62,7 @@ impl Condenser {
             p,
             rows: 0,
             triangle: vec![0.0; (p + 1) * (p + 1)],
-            panel: vec![[0.0; BLOCK]; p + 1],
+            panel: vec![Column([0.0; BLOCK]); p + 1],
             waiting: 0,
         }
     }
@@ -83,7 +86,7 @@ impl Condenser {
         }
         let at = self.waiting;
         for (column, &value) in self.panel.iter_mut().zip(row.iter().chain([&rhs])) {
-            column[at] = value;
+            column.0[at] = value;
         }
         self.waiting += 1;
         self.rows += 1;
@@ -121,19 +124,25 @@ impl Condenser {
         Ok(())
     }
 
-    /// Adds [`BLOCK`] rows at once where no row waits; `false`, and nothing is done, where some do.
+    /// Adds up to [`BLOCK`] rows at once where no row waits; `false`, and nothing is done, where some do.
     ///
-    /// * `write` - writes `p + 1` columns, the last of them b
+    /// * `rows` - their number
+    /// * `write` - writes them into `p + 1` columns, the last of them b
     ///
     /// # Errors
     /// [`NumericsError::NotFinite`] as [`Condenser::push`]; then none of the rows is added.
     #[inline]
-    pub fn push_panel(&mut self, write: impl FnOnce(&mut [Column])) -> Result<bool, NumericsError> {
+    pub fn push_panel(
+        &mut self,
+        rows: usize,
+        write: impl FnOnce(&mut [Column]),
+    ) -> Result<bool, NumericsError> {
         if self.waiting > 0 {
             return Ok(false);
         }
         write(&mut self.panel);
         for column in &self.panel {
+            let column = &column.0[..rows];
             if !dispatch(Accept(column)) {
                 let bad = |v: &&f64| v.abs() >= LARGEST || v.is_nan();
                 return Err(NumericsError::NotFinite {
@@ -143,9 +152,11 @@ impl Condenser {
                 });
             }
         }
-        self.waiting = BLOCK;
-        self.rows += BLOCK;
-        self.fold();
+        self.waiting = rows;
+        self.rows += rows;
+        if rows == BLOCK {
+            self.fold();
+        }
         Ok(true)
     }
 
@@ -200,7 +211,7 @@ impl Condenser {
     fn take_block(&mut self, rows: &[f64], rhs: &[f64]) {
         let places = self.waiting..self.waiting + rhs.len();
         for (j, column) in self.panel.iter_mut().enumerate() {
-            let column = &mut column[places.clone()];
+            let column = &mut column.0[places.clone()];
             if j == self.p {
                 column.copy_from_slice(rhs);
             } else {
@@ -219,7 +230,7 @@ impl Condenser {
 
     fn push_with(&mut self, value: impl Fn(usize) -> f64) {
         for (j, column) in self.panel.iter_mut().enumerate() {
-            column[self.waiting] = value(j);
+            column.0[self.waiting] = value(j);
         }
         self.waiting += 1;
         if self.waiting == BLOCK {
@@ -234,7 +245,7 @@ impl Condenser {
         }
         if self.waiting < BLOCK {
             for column in &mut self.panel {
-                column[self.waiting..].fill(0.0);
+                column.0[self.waiting..].fill(0.0);
             }
         }
         self.waiting = 0;
@@ -275,17 +286,17 @@ struct Reflect<'a> {
     triangle: &'a mut [f64],
 }
 
-impl Computation for Reflect<'_> {
+impl WithSimd for Reflect<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { panel, triangle } = self;
         let width = panel.len();
         for k in 0..width {
             let (head, rest) = panel.split_at_mut(k + 1);
             let v = &head[k];
-            let below = dot(v, v);
+            let [below] = dots(simd, v, from_ref(v));
             if below < NOTHING {
                 continue;
             }
@@ -296,18 +307,46 @@ impl Computation for Reflect<'_> {
             row[0] = beta;
             // The reflection is I − u uᵀ / (β(β−α)) with u = [α−β; v]: no division of the panel, no cancellation.
             let first = alpha - beta;
-            let factor = 1.0 / (beta * (beta - alpha));
-            for (x, r) in rest.iter_mut().zip(&mut row[1..]) {
-                let s = (first * *r + dot(v, x)) * factor;
-                *r -= s * first;
-                subtract(x, s, v);
+            let reflection = Reflection {
+                v,
+                first,
+                factor: 1.0 / (beta * (beta - alpha)),
+            };
+            let (pairs, single) = rest.as_chunks_mut::<2>();
+            let (heads, head) = row[1..].as_chunks_mut::<2>();
+            for (x, r) in pairs.iter_mut().zip(heads) {
+                reflection.apply(simd, x, r);
+            }
+            if let ([x], [r]) = (single, head) {
+                reflection.apply(simd, from_mut(x), from_mut(r));
             }
         }
     }
 }
 
+/// What a column is reflected with.
+struct Reflection<'a> {
+    v: &'a Column,
+    /// In the row of the triangle.
+    first: f64,
+    factor: f64,
+}
+
+impl Reflection<'_> {
+    /// Reflects some columns and their numbers in the triangle.
+    #[inline(always)]
+    fn apply<S: Simd, const C: usize>(&self, simd: S, x: &mut [Column; C], r: &mut [f64; C]) {
+        let mut s = dots(simd, self.v, x);
+        for (s, r) in s.iter_mut().zip(r) {
+            *s = (self.first * *r + *s) * self.factor;
+            *r -= *s * self.first;
+        }
+        subtract(simd, x, s, self.v);
+    }
+}
+
 /// Whether a column is [`acceptable`].
-struct Accept<'a>(&'a Column);
+struct Accept<'a>(&'a [f64]);
 
 impl Computation for Accept<'_> {
     type Output = bool;
@@ -324,20 +363,41 @@ fn acceptable(values: &[f64]) -> bool {
     values.iter().fold(true, |ok, v| ok & (v.abs() < LARGEST))
 }
 
+/// Dot products of a column with some others. Written with vectors, since the compiler would make half as wide ones of the partial sums;
+/// their number does not depend on the width, and so neither do the bits.
 #[inline(always)]
-fn dot(a: &Column, b: &Column) -> f64 {
-    let mut sums = [0.0; LANES];
-    for (x, y) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        for l in 0..LANES {
-            sums[l] += x[l] * y[l];
+fn dots<S: Simd, const C: usize>(simd: S, a: &Column, others: &[Column; C]) -> [f64; C] {
+    let vectors = LANES / S::F64_LANES;
+    let mut sums = [[simd.splat_f64s(0.0); LANES]; C];
+    let a = S::as_simd_f64s(&a.0).0;
+    for start in (0..a.len()).step_by(vectors) {
+        for (b, sums) in others.iter().zip(&mut sums) {
+            let b = S::as_simd_f64s(&b.0).0;
+            for i in 0..vectors {
+                let product = simd.mul_f64s(a[start + i], b[start + i]);
+                sums[i] = simd.add_f64s(sums[i], product);
+            }
         }
     }
-    ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
+    let mut found = [0.0; C];
+    for (found, sums) in found.iter_mut().zip(&sums) {
+        let mut s = [0.0; LANES];
+        S::as_mut_simd_f64s(&mut s)
+            .0
+            .copy_from_slice(&sums[..vectors]);
+        *found = ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+    }
+    found
 }
 
+/// `x −= s v` for some columns.
 #[inline(always)]
-fn subtract(x: &mut Column, s: f64, v: &Column) {
-    for (x, v) in x.iter_mut().zip(v) {
-        *x -= s * v;
+fn subtract<S: Simd, const C: usize>(simd: S, x: &mut [Column; C], s: [f64; C], v: &Column) {
+    let v = S::as_simd_f64s(&v.0).0;
+    for i in 0..v.len() {
+        for (x, s) in x.iter_mut().zip(s) {
+            let x = &mut S::as_mut_simd_f64s(&mut x.0).0[i];
+            *x = simd.sub_f64s(*x, simd.mul_f64s(simd.splat_f64s(s), v[i]));
+        }
     }
 }

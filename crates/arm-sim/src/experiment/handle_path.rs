@@ -1,6 +1,6 @@
 //! The path of the robot's handle over time.
 
-use arm_core::{Chain, Plane, Robot, Scalar};
+use arm_core::{Chain, Plane, Robot, write_sines_and_cosines};
 
 use crate::error::finite;
 use crate::experiment::movement::Way;
@@ -212,7 +212,7 @@ fn tip_motion<const P: usize, const N: usize>(
     arm: &Chain<f64, N>,
     way: &Way<'_, P, N>,
 ) -> Handles<P> {
-    let [mut angle, mut speed, mut acceleration] = [[0.0; P]; 3];
+    let [mut angle, mut speed, mut acceleration, mut sin, mut cos] = [[0.0; P]; 5];
     let mut sums = [[0.0; P]; 6];
     let [y0, z0] = arm.base();
     (sums[0], sums[1]) = ([y0; P], [z0; P]);
@@ -223,7 +223,7 @@ fn tip_motion<const P: usize, const N: usize>(
             speed[t] += qd;
             acceleration[t] += qdd;
         }
-        let [sin, cos] = f64::sines_and_cosines(&angle);
+        write_sines_and_cosines(&angle, [&mut sin, &mut cos]);
         for t in 0..P {
             let [y, z] = [segment.length * cos[t], segment.length * sin[t]];
             let inward = speed[t] * speed[t];
