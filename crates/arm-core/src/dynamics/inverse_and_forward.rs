@@ -91,7 +91,7 @@ pub fn inverse_dynamics_inlined<T: Scalar, const N: usize>(
 
 /// Joint accelerations under a load \[rad/s²\]; the inverse of [`inverse_dynamics`].
 ///
-/// Solved in link angles by a square-root-free Cholesky factorisation. The arm of a validated [`Chain`] has a positive
+/// Solved in link angles by a factorisation without square roots ([`Resistance`]). The arm of a validated [`Chain`] has a positive
 /// definite inertia matrix unless all inertia about a joint vanishes; then the result is not finite.
 #[inline(always)]
 pub fn forward_dynamics<T: Scalar, const N: usize>(
@@ -114,25 +114,33 @@ pub fn accelerations<T: Scalar, const N: usize>(
     Resistance::at(products, pose, qd).accelerations(products, pose, load)
 }
 
-/// What an arm in one state opposes to any load: its inertia matrix in link angles, factorised as `L D Lᵀ`, and what its speeds
-/// demand. Of several loads in one state each then costs a third.
+/// What an arm in one state opposes to any load: its inertia matrix in link angles, factorised, and what its speeds demand. Of several
+/// loads in one state each then costs a third.
+///
+/// As `L D Lᵀ`, but for the last two links of three and more: their block is inverted. Every pivot needs a division, which waits for the
+/// one before; the block needs a single one.
 #[derive(Clone, Copy, Debug)]
 pub struct Resistance<T, const N: usize> {
     /// `L D` up to the diagonal, by rows.
     matrix: [[T; N]; N],
     /// One over `D`.
     reciprocal: [T; N],
+    /// The inverse of the last block: its diagonal, and between these what lies beside it, with the opposite sign.
+    last: [T; 3],
     /// `C q̇` of each link \[N m\].
     demand: [T; N],
 }
 
 impl<T: Scalar, const N: usize> Resistance<T, N> {
+    /// The number of pivots that are eliminated one by one.
+    const SINGLE: usize = if N < 3 { N } else { N - 2 };
+
     /// The resistance in a state.
     #[inline(always)]
     pub fn at(products: &Products<T, N>, pose: &Pose<T, N>, qd: &Joints<T, N>) -> Self {
         let (mut m, demand) = link_motion(products, pose, &to_links(qd));
         let mut reciprocal = [products.first; N];
-        each!(k in 0, N => {
+        each!(k in 0, Self::SINGLE => {
             if k > 0 {
                 reciprocal[k] = T::ONE / m[k][k];
             }
@@ -143,9 +151,16 @@ impl<T: Scalar, const N: usize> Resistance<T, N> {
                 });
             });
         });
+        let mut last = [T::ZERO; 3];
+        if Self::SINGLE < N {
+            let (near, beside, far) = (m[N - 2][N - 2], m[N - 1][N - 2], m[N - 1][N - 1]);
+            let over = T::ONE / (near * far - beside * beside);
+            last = [far * over, beside * over, near * over];
+        }
         Self {
             matrix: m,
             reciprocal,
+            last,
             demand,
         }
     }
@@ -189,13 +204,20 @@ impl<T: Scalar, const N: usize> Resistance<T, N> {
     #[inline(always)]
     fn solve(&self, mut b: [T; N]) -> Joints<T, N> {
         let (m, reciprocal) = (&self.matrix, &self.reciprocal);
-        each!(k in 0, N => {
+        each!(k in 0, Self::SINGLE => {
             each!(i in k + 1, N => {
                 let factor = m[i][k] * reciprocal[k];
                 b[i] -= factor * b[k];
             });
         });
-        each!(i in rev 0, N => {
+        if Self::SINGLE < N {
+            let [near, beside, far] = self.last;
+            (b[N - 2], b[N - 1]) = (
+                near * b[N - 2] - beside * b[N - 1],
+                far * b[N - 1] - beside * b[N - 2],
+            );
+        }
+        each!(i in rev 0, Self::SINGLE => {
             each!(k in i + 1, N => {
                 b[i] -= m[k][i] * b[k];
             });

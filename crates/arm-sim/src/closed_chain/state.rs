@@ -99,14 +99,14 @@ impl<T: Scalar, const N: usize> State<T, N> {
         sum.is_finite()
     }
 
-    /// Goes on for a time by semi-implicit Euler: first the speeds, and with the new ones the angles.
+    /// Goes on for a time by semi-implicit Euler: the speeds, and with the new ones the angles, `q + h (q̇ + h q̈)`, in the order in which
+    /// least waits for the accelerations.
     #[inline(always)]
     pub fn advance(&mut self, h: T, now: &Outcome<T, N>) {
         for i in 0..N {
+            let coasted = self.q[i] + h * self.qd[i];
+            self.q[i] = coasted + h * h * now.qdd[i];
             self.qd[i] += h * now.qdd[i];
-        }
-        for i in 0..N {
-            self.q[i] += h * self.qd[i];
         }
         for i in 0..4 {
             self.work[i] += h * now.power[i];
