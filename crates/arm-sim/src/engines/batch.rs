@@ -1,47 +1,62 @@
-//! Many runs side by side: eight in the lanes of one, groups of eight over threads.
+//! Many runs side by side: several in the lanes of one, groups of lanes that share their drive, sets of groups over threads.
 
 use std::mem::discriminant;
 
-use arm_core::effect::Effect;
-use arm_core::{Contact, Displaced, Joints, Lanes, Plane, Pose, Scalar, Segment, Setup, Wave};
+use arm_core::{Joints, Lanes, Plane, Pose, Scalar, Setup};
 
 use crate::closed_chain::branch_free::BranchFree;
-use crate::closed_chain::model::{Link, Model};
-use crate::closed_chain::state::{BaseMotion, Input, Outcome, State};
+use crate::closed_chain::model::Model;
+use crate::closed_chain::state::{Input, Outcome, State};
 use crate::engines::native::{BranchFreeSteps, diverged};
+use crate::engines::packing::{
+    pack, pack_assistance, pack_effect, pack_input, pack_link, pack_setup,
+};
 use crate::engines::simulate::simulate;
 use crate::integrators::divided_step::step_in_pieces;
 use crate::integrators::input_buffer::{Ahead, InputBuffer};
 use crate::integrators::step::{Inputs, Memory, step};
 use crate::preparation::prepared_run::{Prepared, commands};
 use crate::recording::recorder::{Instant, Recorder, Row};
-use crate::{Assistance, Experiment, Handle, Integrator, Recording, SimulationError, Springs};
-use arm_core::simd_dispatch::{Computation, dispatch};
+use crate::{Experiment, Handle, Integrator, Recording, SimulationError};
+use arm_core::simd_dispatch::{Computation, dispatch, has_registers_of_eight};
 
-/// Runs in one group.
-const LANES: usize = 8;
+/// Most groups in a set: the drive is then computed once for so many.
+const GROUPS: usize = 8;
 
-type Wide = Lanes<LANES>;
 type Outcomes<const N: usize> = Vec<Result<Recording<N>, SimulationError>>;
 
 /// Simulates many experiments; each has the bits of [`simulate`], whatever its neighbours and the number of threads.
 ///
-/// Neighbours that differ only in values (not in kinds of effects, steps, or the kind of drive) run eight at a time in
-/// one pass; order similar experiments together.
+/// Neighbours that differ only in values (not in kinds of effects, steps, or the kind of drive) run side by side in one pass, as many
+/// as fit into a register of this processor; order similar experiments together.
 pub fn simulate_batch<const N: usize>(
     experiments: &[Experiment<N>],
     threads: usize,
 ) -> Outcomes<N> {
-    let groups: Vec<&[Experiment<N>]> = experiments.chunks(LANES).collect();
-    let threads = threads.clamp(1, groups.len().max(1));
+    if has_registers_of_eight() {
+        batch::<8, N>(experiments, threads)
+    } else {
+        batch::<4, N>(experiments, threads)
+    }
+}
+
+fn batch<const L: usize, const N: usize>(
+    experiments: &[Experiment<N>],
+    threads: usize,
+) -> Outcomes<N> {
+    // Some sets for each thread, so that none waits long for the last.
+    let groups = experiments.len().div_ceil(L);
+    let groups_in_set = groups.div_ceil(4 * threads.max(1)).clamp(1, GROUPS);
+    let sets: Vec<&[Experiment<N>]> = experiments.chunks(groups_in_set * L).collect();
+    let threads = threads.clamp(1, sets.len().max(1));
     let mut done: Vec<Outcomes<N>> = Vec::new();
     if threads == 1 {
-        done.extend(groups.into_iter().map(group));
+        done.extend(sets.into_iter().map(set::<L, N>));
     } else {
-        // Every thread takes each `threads`-th group: fixed, and even for runs of slowly changing cost.
+        // Every thread takes each `threads`-th set: fixed, and even for runs of slowly changing cost.
         let share = &|first: usize| -> Vec<Outcomes<N>> {
-            let mine = groups.iter().skip(first).step_by(threads);
-            mine.map(|experiments| group(experiments)).collect()
+            let mine = sets.iter().skip(first).step_by(threads);
+            mine.map(|experiments| set::<L, N>(experiments)).collect()
         };
         let mut shares: Vec<_> = std::thread::scope(|scope| {
             let workers: Vec<_> = (0..threads)
@@ -53,30 +68,38 @@ pub fn simulate_batch<const N: usize>(
                 .map(Vec::into_iter)
                 .collect()
         });
-        for index in 0..groups.len() {
+        for index in 0..sets.len() {
             done.extend(shares[index % threads].next());
         }
     }
     done.into_iter().flatten().collect()
 }
 
-/// Up to eight runs: in lanes where they are alike, else one by one.
-fn group<const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
-    let prepared: Result<Vec<_>, _> = experiments.iter().map(Prepared::new).collect();
-    match prepared {
-        // The switches of dry friction are of each run alone.
-        Ok(prepared)
-            if prepared.len() > 1
-                && !prepared.iter().any(|p| p.model.has_dry)
-                && prepared.iter().all(|p| alike(p, &prepared[0])) =>
-        {
-            match side_by_side(&prepared) {
-                Ok(outcomes) => outcomes,
-                Err(error) => vec![Err(error); prepared.len()],
-            }
+/// Some runs: side by side where neighbours are alike, else one by one.
+fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
+    let prepared: Vec<_> = experiments.iter().map(Prepared::new).collect();
+    let mut outcomes = Vec::with_capacity(prepared.len());
+    for neighbours in prepared.chunk_by(|a, b| match (a, b) {
+        (Ok(a), Ok(b)) => may_be_beside(a) && may_be_beside(b) && alike(a, b),
+        _ => false,
+    }) {
+        let first = outcomes.len();
+        if neighbours.len() == 1 {
+            outcomes.push(simulate(&experiments[first]));
+            continue;
         }
-        _ => experiments.iter().map(simulate).collect(),
+        let neighbours: Vec<_> = neighbours.iter().flatten().collect();
+        match side_by_side::<L, N>(&neighbours) {
+            Ok(all) => outcomes.extend(all),
+            Err(error) => outcomes.extend(vec![Err(error); neighbours.len()]),
+        }
     }
+    outcomes
+}
+
+/// Whether a run may run beside others: the switches of dry friction are of each run alone.
+fn may_be_beside<const N: usize>(run: &Prepared<N>) -> bool {
+    !run.model.has_dry
 }
 
 /// Whether two runs take the same steps.
@@ -102,20 +125,28 @@ fn same_drive<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && a.experiment.assistance == b.experiment.assistance
 }
 
-/// The run of a lane. A group of fewer than eight repeats its last one in the lanes left over.
+/// The run of a lane. A group of fewer runs than lanes repeats its last one in the lanes left over.
 fn in_lane<'a, 'b, const N: usize>(
-    prepared: &'b [Prepared<'a, N>],
+    prepared: &'b [&'b Prepared<'a, N>],
     lane: usize,
 ) -> &'b Prepared<'a, N> {
-    &prepared[lane.min(prepared.len() - 1)]
+    prepared[lane.min(prepared.len() - 1)]
 }
 
-/// The runs in the lanes of one.
-fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>, SimulationError> {
-    let schedule = prepared[0].schedule;
-    let mut group = Group::new(prepared)?;
-    group.sample(0);
-    // Where the drive of any lane breaks, every lane makes its own step.
+/// Runs that are alike, in groups of as many as there are lanes, which go on together.
+fn side_by_side<const L: usize, const N: usize>(
+    prepared: &[&Prepared<N>],
+) -> Result<Outcomes<N>, SimulationError> {
+    let (first, schedule) = (prepared[0], prepared[0].schedule);
+    let one_drive = prepared
+        .iter()
+        .all(|p| same_drive(p, first) && p.setup.is_as_commanded());
+    let groups = prepared.chunks(L);
+    let groups = groups.map(|runs| Group::<L, N>::new(runs, one_drive));
+    let mut groups = groups.collect::<Result<Vec<_>, _>>()?;
+    let mut common = InputBuffer::new(first.integrator());
+    groups.iter_mut().for_each(|group| group.sample(0));
+    // Where the drive of any run breaks, every run makes its own step.
     let mut broken: Vec<usize> = prepared
         .iter()
         .flat_map(|p| p.discontinuities.steps())
@@ -124,52 +155,58 @@ fn side_by_side<const N: usize>(prepared: &[Prepared<N>]) -> Result<Outcomes<N>,
     broken.dedup();
     let mut broken = broken.into_iter().peekable();
     let (mut done, mut sampled) = (0, 0);
-    while done < schedule.steps {
+    while done < schedule.steps && groups.iter().any(Group::goes_on) {
         let next = done + 1;
+        let going = groups.iter_mut().filter(|group| group.goes_on());
         if broken.next_if_eq(&next).is_some() {
-            step_apart(prepared, next, (&mut group.state, &mut group.memory));
             done = next;
+            going.for_each(|group| group.step_apart(next));
         } else {
             let most = schedule.smooth(done, sampled, broken.peek());
-            done += group.advance(next, most);
-        }
-        if group.stop_diverged(done) {
-            break;
+            let drive = if one_drive {
+                Some(common.ahead(next, most, |half_steps, out| {
+                    commands(first.experiment, &schedule, half_steps, out);
+                }))
+            } else {
+                None
+            };
+            let steps = drive.map_or(most, |ahead| ahead.steps);
+            going.for_each(|group| group.advance(next, steps, drive));
+            done += steps;
         }
         if done == sampled + schedule.every {
             sampled = done;
-            group.sample(done);
+            groups.iter_mut().for_each(|group| group.sample(done));
         }
     }
-    Ok(group.finish())
+    Ok(groups.into_iter().flat_map(Group::finish).collect())
 }
 
 /// Runs in the lanes of one, on their way.
-struct Group<'a, const N: usize> {
-    prepared: &'a [Prepared<'a, N>],
-    setup: Setup<Wide, N>,
-    model: Model<Wide, N>,
+struct Group<'a, 'b, const L: usize, const N: usize> {
+    prepared: &'b [&'b Prepared<'a, N>],
+    setup: Setup<Lanes<L>, N>,
+    model: Model<Lanes<L>, N>,
     /// The rig, where it is plain.
-    plain: Option<BranchFree<Wide, N>>,
+    plain: Option<BranchFree<Lanes<L>, N>>,
     /// Whether one drive, without displacement, is that of all lanes.
     one_drive: bool,
-    common: InputBuffer<f64, N>,
-    own: InputBuffer<Wide, N>,
+    own: InputBuffer<Lanes<L>, N>,
     /// Room for the commands of each lane.
-    commanded: [Vec<Input<f64, N>>; LANES],
-    state: State<Wide, N>,
-    memory: Memory<Wide>,
-    row: Row<Wide>,
-    recorders: Vec<Recorder<'a, 'static, N>>,
+    commanded: [Vec<Input<f64, N>>; L],
+    state: State<Lanes<L>, N>,
+    memory: Memory<Lanes<L>>,
+    row: Row<Lanes<L>>,
+    recorders: Vec<Recorder<'b, 'static, N>>,
     /// Why a run stopped early.
     stopped: Vec<Option<SimulationError>>,
 }
 
-impl<'a, const N: usize> Group<'a, N> {
-    fn new(prepared: &'a [Prepared<'a, N>]) -> Result<Self, SimulationError> {
+impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
+    fn new(prepared: &'b [&'b Prepared<'a, N>], one_drive: bool) -> Result<Self, SimulationError> {
         let lane = |i: usize| in_lane(prepared, i);
-        let first = &prepared[0];
-        let setup = pack_setup(lane);
+        let first = prepared[0];
+        let setup: Setup<Lanes<L>, N> = pack_setup(lane);
         let effects =
             (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
         let mut model = Model::new(&setup, pack_link(lane, setup.contact), effects.collect())?;
@@ -181,27 +218,29 @@ impl<'a, const N: usize> Group<'a, N> {
         Ok(Self {
             prepared,
             plain: model.plain(),
-            one_drive: prepared
-                .iter()
-                .all(|p| same_drive(p, first) && p.setup.is_as_commanded()),
-            common: InputBuffer::new(first.integrator()),
+            one_drive,
             own: InputBuffer::new(first.integrator()),
-            commanded: Default::default(),
+            commanded: [const { Vec::new() }; L],
             state: State {
                 q: Joints::from_fn(|j, _| pack(|i| lane(i).start.0[j])),
                 qd: Joints::from_fn(|j, _| pack(|i| lane(i).start.1[j])),
-                work: [Wide::ZERO; 4],
+                work: [Lanes::ZERO; 4],
             },
             memory: Memory::new(model.effects.len()),
             row: Row::new(),
             recorders: prepared
                 .iter()
-                .map(Recorder::new)
+                .map(|run| Recorder::new(run))
                 .collect::<Result<_, _>>()?,
             stopped: vec![None; prepared.len()],
             setup,
             model,
         })
+    }
+
+    /// Whether any of the runs has not stopped early.
+    fn goes_on(&self) -> bool {
+        self.stopped.iter().any(Option::is_none)
     }
 
     /// Records the runs that go on, after a number of steps.
@@ -228,29 +267,37 @@ impl<'a, const N: usize> Group<'a, N> {
         }
     }
 
-    /// Makes steps from number `next` on, at most `most`; returns how many.
-    fn advance(&mut self, next: usize, most: usize) -> usize {
-        let (prepared, first) = (self.prepared, &self.prepared[0]);
-        let schedule = &first.schedule;
-        let steps = Steps {
-            model: &self.model,
-            plain: self.plain.as_ref(),
-            integrator: first.integrator(),
-            h: schedule.dt,
-        };
-        let at = (&mut self.state, &mut self.memory);
-        if self.one_drive {
-            let ahead = self.common.ahead(next, most, |half_steps, out| {
-                commands(first.experiment, schedule, half_steps, out);
-            });
-            return dispatch(Advance { steps, ahead, at });
+    /// Makes some steps from number `next` on, or those until all runs have stopped.
+    ///
+    /// * `drive` - of these steps, where one drives all runs
+    fn advance(&mut self, next: usize, steps: usize, drive: Option<Ahead<f64, N>>) {
+        let mut made = 0;
+        while made < steps && self.goes_on() {
+            made += match drive {
+                Some(ahead) => self.advance_along(ahead.after(made)),
+                None => self.advance_apart(next + made, steps - made),
+            };
+            self.stop_diverged(next - 1 + made);
         }
+    }
+
+    /// Makes steps along one drive of all lanes; returns how many.
+    fn advance_along(&mut self, ahead: Ahead<f64, N>) -> usize {
+        let (plain, first) = (self.plain.as_ref(), self.prepared[0]);
+        let steps = Steps::of(&self.model, plain, first);
+        let at = (&mut self.state, &mut self.memory);
+        dispatch(Advance { steps, ahead, at })
+    }
+
+    /// Makes steps from number `next` on, at most `most`, each lane along its own drive; returns how many.
+    fn advance_apart(&mut self, next: usize, most: usize) -> usize {
+        let (prepared, first) = (self.prepared, self.prepared[0]);
         let (commanded, setup) = (&mut self.commanded, &self.setup);
         let ahead = self.own.ahead(next, most, |half_steps, out| {
             for (i, inputs) in commanded.iter_mut().enumerate() {
                 inputs.clear();
                 let experiment = in_lane(prepared, i).experiment;
-                commands(experiment, schedule, half_steps, inputs);
+                commands(experiment, &first.schedule, half_steps, inputs);
             }
             for at in 0..half_steps.len() {
                 let mut input = pack_input(|i| commanded[i][at]);
@@ -258,13 +305,35 @@ impl<'a, const N: usize> Group<'a, N> {
                 out.push(input);
             }
         });
+        let steps = Steps::of(&self.model, self.plain.as_ref(), first);
+        let at = (&mut self.state, &mut self.memory);
         dispatch(Advance { steps, ahead, at })
     }
 
-    /// Stops the runs whose state is no longer finite after a number of steps; returns whether none is left.
-    fn stop_diverged(&mut self, done: usize) -> bool {
+    /// One step of each run by itself.
+    fn step_apart(&mut self, number: usize) {
+        let (state, memory) = (&mut self.state, &mut self.memory);
+        let mut lane_memory = Memory::new(memory.state.len());
+        for i in 0..L {
+            let run = in_lane(self.prepared, i);
+            let mut lane = state.lane(i);
+            let lanes = memory.state.as_flattened_mut();
+            for (one, all) in lane_memory.state.as_flattened_mut().iter_mut().zip(&*lanes) {
+                *one = all.0[i];
+            }
+            step_in_pieces(run, number, (&mut lane, &mut lane_memory));
+            state.set_lane(i, &lane);
+            for (one, all) in lane_memory.state.as_flattened().iter().zip(lanes) {
+                all.0[i] = *one;
+            }
+        }
+        self.stop_diverged(number);
+    }
+
+    /// Stops the runs whose state is no longer finite after a number of steps.
+    fn stop_diverged(&mut self, done: usize) {
         if self.state.is_finite() {
-            return false;
+            return;
         }
         for (i, stop) in self.stopped.iter_mut().enumerate() {
             if let (None, Some(joint)) = (&stop, diverged(&self.state.lane(i))) {
@@ -275,7 +344,6 @@ impl<'a, const N: usize> Group<'a, N> {
                 });
             }
         }
-        self.stopped.iter().all(Option::is_some)
     }
 
     fn finish(self) -> Outcomes<N> {
@@ -288,24 +356,40 @@ impl<'a, const N: usize> Group<'a, N> {
 }
 
 /// What steps are made of, whatever drives them.
-struct Steps<'a, const N: usize> {
-    model: &'a Model<Wide, N>,
+struct Steps<'a, const L: usize, const N: usize> {
+    model: &'a Model<Lanes<L>, N>,
     /// The rig, where it is plain.
-    plain: Option<&'a BranchFree<Wide, N>>,
+    plain: Option<&'a BranchFree<Lanes<L>, N>>,
     integrator: Integrator,
     h: f64,
 }
 
-/// Some steps of all lanes, to the end or to the first after which a state is not finite.
-struct Advance<'a, T, const N: usize> {
-    steps: Steps<'a, N>,
-    ahead: Ahead<'a, T, N>,
-    at: (&'a mut State<Wide, N>, &'a mut Memory<Wide>),
+impl<'a, const L: usize, const N: usize> Steps<'a, L, N> {
+    /// The steps of runs like one of them.
+    fn of(
+        model: &'a Model<Lanes<L>, N>,
+        plain: Option<&'a BranchFree<Lanes<L>, N>>,
+        run: &Prepared<N>,
+    ) -> Self {
+        Self {
+            model,
+            plain,
+            integrator: run.integrator(),
+            h: run.schedule.dt,
+        }
+    }
 }
 
-impl<T: Scalar, const N: usize> Computation for Advance<'_, T, N>
+/// Some steps of all lanes, to the end or to the first after which a state is not finite.
+struct Advance<'a, T, const L: usize, const N: usize> {
+    steps: Steps<'a, L, N>,
+    ahead: Ahead<'a, T, N>,
+    at: (&'a mut State<Lanes<L>, N>, &'a mut Memory<Lanes<L>>),
+}
+
+impl<T: Scalar, const L: usize, const N: usize> Computation for Advance<'_, T, L, N>
 where
-    Input<T, N>: Drives<N>,
+    Input<T, N>: Drives<L, N>,
 {
     /// The number of steps made.
     type Output = usize;
@@ -342,15 +426,16 @@ where
 }
 
 /// Steps of plain rigs in lanes.
-struct Abreast<'a, T, const N: usize> {
-    rig: BranchFree<Wide, N>,
+struct Abreast<'a, T, const L: usize, const N: usize> {
+    rig: BranchFree<Lanes<L>, N>,
     ahead: Ahead<'a, T, N>,
     h: f64,
 }
 
-impl<T: Scalar, const N: usize> BranchFreeSteps<Wide, N> for Abreast<'_, T, N>
+impl<T: Scalar, const L: usize, const N: usize> BranchFreeSteps<Lanes<L>, N>
+    for Abreast<'_, T, L, N>
 where
-    Input<T, N>: Drives<N>,
+    Input<T, N>: Drives<L, N>,
 {
     #[inline(always)]
     fn h(&self) -> f64 {
@@ -359,12 +444,12 @@ where
 
     /// One loop over lanes around all of it, of which the compiler makes vectors.
     #[inline(always)]
-    fn first_order(&self, step: usize, state: &mut State<Wide, N>) {
+    fn first_order(&self, step: usize, state: &mut State<Lanes<L>, N>) {
         let input = self.ahead.step(step).start;
         let pose = Pose::new(&state.q);
         // Into another place: what a lane writes is nothing that another one reads.
         let mut next = *state;
-        for i in 0..LANES {
+        for i in 0..L {
             let mut lane = state.lane(i);
             let rig = self.rig.lane(i);
             let now = rig.evaluate(&input.handle(i), &pose.lane(i), [&lane.q, &lane.qd]);
@@ -379,13 +464,13 @@ where
         &self,
         step: usize,
         stage: usize,
-        [q, qd]: [&Joints<Wide, N>; 2],
-    ) -> Outcome<Wide, N> {
+        [q, qd]: [&Joints<Lanes<L>, N>; 2],
+    ) -> Outcome<Lanes<L>, N> {
         // Copies of which nobody else knows, as of the rig.
         let (input, q, qd) = (*self.ahead.step(step).at_stage(stage), *q, *qd);
         let pose = Pose::new(&q);
         let mut all = Outcome::none();
-        for i in 0..LANES {
+        for i in 0..L {
             let rig = self.rig.lane(i);
             // Not by `map`, which would copy every lane.
             let q = Joints::from_fn(|j, _| q[j].0[i]);
@@ -398,15 +483,15 @@ where
 }
 
 /// What drives all lanes, the same for each or not.
-trait Drives<const N: usize>: Copy {
-    fn wide(&self) -> Input<Wide, N>;
+trait Drives<const L: usize, const N: usize>: Copy {
+    fn wide(&self) -> Input<Lanes<L>, N>;
     /// The handle of one lane.
     fn handle(&self, lane: usize) -> Handle<f64>;
 }
 
-impl<const N: usize> Drives<N> for Input<f64, N> {
+impl<const L: usize, const N: usize> Drives<L, N> for Input<f64, N> {
     #[inline(always)]
-    fn wide(&self) -> Input<Wide, N> {
+    fn wide(&self) -> Input<Lanes<L>, N> {
         pack_input(|_| *self)
     }
     #[inline(always)]
@@ -415,14 +500,14 @@ impl<const N: usize> Drives<N> for Input<f64, N> {
     }
 }
 
-impl<const N: usize> Drives<N> for Input<Wide, N> {
+impl<const L: usize, const N: usize> Drives<L, N> for Input<Lanes<L>, N> {
     #[inline(always)]
-    fn wide(&self) -> Input<Wide, N> {
+    fn wide(&self) -> Input<Lanes<L>, N> {
         *self
     }
     #[inline(always)]
     fn handle(&self, lane: usize) -> Handle<f64> {
-        let plane = |of: &Plane<Wide>| [of[0].0[lane], of[1].0[lane]];
+        let plane = |of: &Plane<Lanes<L>>| [of[0].0[lane], of[1].0[lane]];
         Handle {
             position: plane(&self.handle.position),
             velocity: plane(&self.handle.velocity),
@@ -431,125 +516,33 @@ impl<const N: usize> Drives<N> for Input<Wide, N> {
     }
 }
 
-/// One step of each run by itself.
-fn step_apart<const N: usize>(
-    prepared: &[Prepared<N>],
-    number: usize,
-    (state, memory): (&mut State<Wide, N>, &mut Memory<Wide>),
-) {
-    let mut lane_memory = Memory::new(memory.state.len());
-    for i in 0..LANES {
-        let run = in_lane(prepared, i);
-        let mut lane = state.lane(i);
-        let lanes = memory.state.as_flattened_mut();
-        for (one, all) in lane_memory.state.as_flattened_mut().iter_mut().zip(&*lanes) {
-            *one = all.0[i];
+#[cfg(test)]
+mod tests {
+    use super::{Outcomes, batch};
+    use crate::{Experiment, sample_experiments, simulate};
+
+    /// Runs that differ in their masses; one in the middle is of another length, and so not like its neighbours.
+    fn runs() -> Vec<Experiment<3>> {
+        let run = |i: u32| {
+            let duration = if i == 21 { 0.1 } else { 0.2 };
+            let mut run = sample_experiments::human_experiment(duration, [0.0; 3]).expect("valid");
+            for segment in &mut run.setup.segments {
+                segment.mass *= 1.0 + 0.01 * f64::from(i);
+            }
+            run
+        };
+        (0..43).map(run).collect()
+    }
+
+    /// A processor takes one of the two numbers of lanes; here are both.
+    #[test]
+    fn every_number_of_lanes_records_what_single_runs_do() {
+        let runs = runs();
+        let alone: Outcomes<3> = runs.iter().map(simulate).collect();
+        assert!(alone.iter().all(Result::is_ok));
+        for threads in [1, 3] {
+            assert_eq!(batch::<4, 3>(&runs, threads), alone, "4 lanes");
+            assert_eq!(batch::<8, 3>(&runs, threads), alone, "8 lanes");
         }
-        step_in_pieces(run, number, (&mut lane, &mut lane_memory));
-        state.set_lane(i, &lane);
-        for (one, all) in lane_memory.state.as_flattened().iter().zip(lanes) {
-            all.0[i] = *one;
-        }
-    }
-}
-
-fn pack(value: impl Fn(usize) -> f64) -> Wide {
-    Lanes(core::array::from_fn(value))
-}
-
-fn pack_plane(value: impl Fn(usize) -> Plane<f64>) -> Plane<Wide> {
-    [0, 1].map(|axis| pack(|i| value(i)[axis]))
-}
-
-fn pack_link<'a, const N: usize>(
-    lane: impl Fn(usize) -> &'a Prepared<'a, N>,
-    contact: Contact<Wide>,
-) -> Link<Wide> {
-    match lane(0).model.link {
-        Link::Compliant(_) => Link::Compliant(contact),
-        Link::Free => Link::Free,
-        Link::Forced(_) => Link::Forced(pack_plane(|i| match lane(i).model.link {
-            Link::Forced(force) => force,
-            _ => [0.0; 2],
-        })),
-        Link::Rigid => Link::Rigid,
-    }
-}
-
-fn pack_effect<'a>(effect: impl Fn(usize) -> &'a Effect<f64>) -> Effect<Wide> {
-    let first = effect(0);
-    Effect {
-        kind: first.kind,
-        index: first.index,
-        parameters: core::array::from_fn(|p| pack(|i| effect(i).parameters[p])),
-        on: first.on,
-    }
-}
-
-fn pack_input<const N: usize>(input: impl Fn(usize) -> Input<f64, N>) -> Input<Wide, N> {
-    let inputs: [Input<f64, N>; LANES] = core::array::from_fn(input);
-    Input {
-        time: pack(|i| inputs[i].time),
-        handle: Handle {
-            position: pack_plane(|i| inputs[i].handle.position),
-            velocity: pack_plane(|i| inputs[i].handle.velocity),
-            acceleration: pack_plane(|i| inputs[i].handle.acceleration),
-        },
-        torque: Joints::from_fn(|j, _| pack(|i| inputs[i].torque[j])),
-        base: BaseMotion {
-            position: pack_plane(|i| inputs[i].base.position),
-            velocity: pack_plane(|i| inputs[i].base.velocity),
-            acceleration: pack_plane(|i| inputs[i].base.acceleration),
-        },
-        activity: core::array::from_fn(|j| pack(|i| inputs[i].activity[j])),
-    }
-}
-
-/// Stiffness and damping of the lanes' assistance, which they all have or none has.
-fn pack_assistance<'a, const N: usize>(
-    assistance: impl Fn(usize) -> Option<&'a Assistance<N>>,
-) -> Option<[[Wide; N]; 2]> {
-    assistance(0)?;
-    let of = |read: fn(&Springs<N>) -> &[f64; N]| {
-        core::array::from_fn(|j| pack(|i| assistance(i).map_or(0.0, |a| read(&a.springs)[j])))
-    };
-    Some([of(|a| &a.stiffness), of(|a| &a.damping)])
-}
-
-fn pack_wave<'a>(wave: impl Fn(usize) -> &'a Wave<f64>) -> Wave<Wide> {
-    Wave {
-        amplitude: pack_plane(|i| wave(i).amplitude),
-        frequency: pack(|i| wave(i).frequency),
-        phase: pack(|i| wave(i).phase),
-    }
-}
-
-fn pack_setup<'a, const N: usize>(lane: impl Fn(usize) -> &'a Prepared<'a, N>) -> Setup<Wide, N> {
-    let setup = |i: usize| &lane(i).setup;
-    Setup {
-        segments: core::array::from_fn(|s| Segment {
-            length: pack(|i| setup(i).segments[s].length),
-            mass: pack(|i| setup(i).segments[s].mass),
-            com: pack_plane(|i| setup(i).segments[s].com),
-            inertia: pack(|i| setup(i).segments[s].inertia),
-        }),
-        rotor: core::array::from_fn(|s| pack(|i| setup(i).rotor[s])),
-        base: pack_plane(|i| setup(i).base),
-        gravity: pack_plane(|i| setup(i).gravity),
-        contact: Contact {
-            stiffness: pack_plane(|i| setup(i).contact.stiffness),
-            damping: pack_plane(|i| setup(i).contact.damping),
-            play: pack_plane(|i| setup(i).contact.play),
-        },
-        placement: pack_plane(|i| setup(i).placement),
-        base_motion: pack_plane(|i| setup(i).base_motion),
-        base_rest: pack(|i| setup(i).base_rest),
-        heave: pack_wave(|i| &setup(i).heave),
-        displaced: Displaced {
-            ripple: pack_wave(|i| &setup(i).displaced.ripple),
-            slip: pack_plane(|i| setup(i).displaced.slip),
-            slip_start: pack(|i| setup(i).displaced.slip_start),
-        },
-        force_delay: pack(|i| setup(i).force_delay),
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod accuracy;
 pub(crate) mod batch;
 pub(crate) mod native;
+mod packing;
 #[cfg(feature = "rapier")]
 pub(crate) mod rapier;
 pub(crate) mod simulate;

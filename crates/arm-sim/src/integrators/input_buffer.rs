@@ -27,6 +27,15 @@ pub(crate) struct Ahead<'a, T, const N: usize> {
 }
 
 impl<T: Scalar, const N: usize> Ahead<'_, T, N> {
+    /// The drive of the steps after so many.
+    pub fn after(self, steps: usize) -> Self {
+        Self {
+            steps: self.steps - steps,
+            inputs: &self.inputs[steps * self.points..],
+            ..self
+        }
+    }
+
     /// What drives one of them, counted from zero.
     #[inline(always)]
     pub fn step(&self, step: usize) -> Inputs<'_, T, N> {
