@@ -229,6 +229,9 @@ class Simulated(Doubted, Tabular, Series):
 
     def pieces(self, samples: int = PIECE) -> Iterator[Simulated]:
         """Give the samples in order, so many at a time."""
+        if len(self.t) <= samples:
+            yield self
+            return
         for first in range(0, len(self.t), samples):
             part = slice(first, first + samples)
             yield self.with_columns(
