@@ -114,18 +114,18 @@ pub fn accelerations<T: Scalar, const N: usize>(
     Resistance::at(products, pose, qd).accelerations(products, pose, load)
 }
 
-/// What an arm in one state opposes to any load: its inertia matrix in link angles, factorised, and what its speeds demand. Of several
-/// loads in one state each then costs a third.
+/// What an arm in one state opposes to any load: its inertia matrix in link angles, factorised, and what its speeds demand, so that another
+/// load in the same state costs less.
 ///
-/// As `L D Lᵀ`, but for the last two links of three and more: their block is inverted. Every pivot needs a division, which waits for the
-/// one before; the block needs a single one.
+/// The factors are those of `L D Lᵀ`, but for the last two links of an arm of three and more: what the links before leave of their block is
+/// inverted. Every pivot needs a division, which waits for that of the pivot before; the block needs one for both.
 #[derive(Clone, Copy, Debug)]
 pub struct Resistance<T, const N: usize> {
-    /// `L D` up to the diagonal, by rows.
+    /// `L D` up to the diagonal, by rows; the last block as the links before leave it.
     matrix: [[T; N]; N],
-    /// One over `D`.
+    /// One over `D` of the links that are eliminated one by one.
     reciprocal: [T; N],
-    /// The inverse of the last block: its diagonal, and between these what lies beside it, with the opposite sign.
+    /// The inverse of the last block: first of its diagonal, opposite of what is beside it, last of its diagonal.
     last: [T; 3],
     /// `C q̇` of each link \[N m\].
     demand: [T; N],

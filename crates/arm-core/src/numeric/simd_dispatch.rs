@@ -15,8 +15,8 @@ pub fn dispatch<C: WithSimd>(computation: C) -> C::Output {
     pulp::Arch::new().dispatch(computation)
 }
 
-/// Whether a register of the processor holds eight numbers, those of AVX-512. Of fewer, one holds four or less, and eight numbers in two
-/// registers leave too few for the rest.
+/// Whether a vector register holds eight numbers (AVX-512). With narrower ones, eight lanes take two or more registers for each quantity,
+/// and too few are left for the rest.
 pub fn has_registers_of_eight() -> bool {
     struct Width;
     impl WithSimd for Width {

@@ -1,4 +1,5 @@
-//! Sine, cosine, exponential and hyperbolic tangent by polynomials, without a branch, for one number or many at once.
+//! Sine, cosine, exponential and hyperbolic tangent by polynomials, for one number or many at once. A single number may take a branch
+//! that many do not; both have the same bits.
 
 use crate::Scalar;
 

@@ -63,6 +63,20 @@ fn functions<const L: usize>(seed: u64) {
     }
 }
 
+/// A single sine takes another branch in each quarter turn.
+#[test]
+fn quarter_turns_have_the_same_bits_in_lanes() {
+    for half_quarter in -9..=9 {
+        let turn = f64::from(half_quarter) * core::f64::consts::FRAC_PI_4;
+        for x in [turn, turn.next_down(), turn.next_up(), -turn] {
+            let (sin, cos) = Lanes([x; 4]).sin_cos();
+            let (s, c) = Scalar::sin_cos(x);
+            same(sin, 3, s);
+            same(cos, 3, c);
+        }
+    }
+}
+
 fn dynamics<const N: usize, const L: usize>(seed: u64) {
     let mut random = Random(seed);
     for _ in 0..200 {

@@ -1,7 +1,7 @@
 //! A second derivation: the recursive Newton-Euler algorithm, body by body in the world's axes.
 
 use arm_core::{
-    Chain, Joints, Load, Plane, Pose, Products, Resistance, contributions, coriolis,
+    Chain, Joints, Load, Plane, Pose, Products, Resistance, Segment, contributions, coriolis,
     forward_dynamics, gravity, inertia, inverse_dynamics, joint_force, static_torque,
 };
 
@@ -187,4 +187,48 @@ fn a_column_of_the_resistance_is_one_of_the_inverse_inertia_matrix() {
             }
         }
     }
+}
+
+/// A hand of 0.1 kg with a radius of gyration of 3 cm at the end of an arm of ordinary segments, with and without a rotor at the wrist that is
+/// as heavy as five hundred hands: nothing is lost beyond the factor by which its inertia about the wrist exceeds the least that it shows.
+fn a_light_hand_is_accelerated_as_exactly<const N: usize>(seed: u64) {
+    let mut random = Random(seed);
+    for rotor in [0.0, 0.05] {
+        for _ in 0..STATES {
+            let mut segments = *random.arm::<N>().segments();
+            segments[N - 1] = Segment {
+                length: 0.08,
+                mass: 0.1,
+                com: [0.06, 0.0],
+                inertia: 0.9e-4,
+            };
+            let mut rotors = [0.0; N];
+            rotors[N - 1] = rotor;
+            let arm = Chain::new(segments, [0.0; 2], [0.0, -9.81])
+                .and_then(|arm| arm.with_rotor_inertia(rotors))
+                .expect("valid");
+            let (q, qd, qdd) = (random.joints(4.0), random.joints(3.0), random.joints(10.0));
+            let pose = Pose::new(&q);
+            let load = Load {
+                torque: inverse_dynamics(&arm, &pose, &qd, &qdd),
+                ..Load::none()
+            };
+            let size = load.torque.amax().max(1.0);
+            let least = 0.9e-4;
+            let allowed = 64.0 * f64::EPSILON * size / least;
+            let back = forward_dynamics(&arm, &pose, &qd, &load);
+            assert!(
+                (back - qdd).amax() < allowed,
+                "{} of {allowed}",
+                (back - qdd).amax()
+            );
+        }
+    }
+}
+
+#[test]
+fn light_hands() {
+    a_light_hand_is_accelerated_as_exactly::<3>(83);
+    a_light_hand_is_accelerated_as_exactly::<4>(84);
+    a_light_hand_is_accelerated_as_exactly::<6>(86);
 }

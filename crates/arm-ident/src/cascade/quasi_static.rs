@@ -13,8 +13,9 @@ use crate::inference::weighted_fit::weighed;
 use crate::regression::trial::Model;
 use crate::regression::unknown::{Moment, Source, Unknown};
 use arm_core::simd_dispatch::{Computation, dispatch};
+use arm_numerics::NumericsError;
 use arm_numerics::error::{check_least, check_len};
-use arm_numerics::least_squares::condense::{BLOCK, Column, Condenser};
+use arm_numerics::least_squares::condense::{BLOCK, Column, Condenser, acceptable};
 use arm_numerics::least_squares::factor::Factor;
 use arm_numerics::linalg::matrix::{Matrix, add_scaled, dot};
 
@@ -42,8 +43,7 @@ impl<const N: usize> Stream<N> {
     /// * `force_on_arm` - at the tip \[N\]
     ///
     /// # Errors
-    /// [`NumericsError::Length`](arm_numerics::NumericsError::Length); [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite)
-    /// when a block of [`BLOCK`] samples is complete and one of them is bad: the blocks before it stand.
+    /// [`NumericsError::Length`]; [`NumericsError::NotFinite`] for the first sample with a number that is not finite or too large. The samples before it stand.
     pub fn push(
         &mut self,
         q: &[Joints<f64, N>],
@@ -52,16 +52,18 @@ impl<const N: usize> Stream<N> {
         check_len("force_on_arm", force_on_arm.len(), q.len())?;
         let (mut q, mut force) = (q, force_on_arm);
         while !q.is_empty() {
-            let taken = q.len().min(BLOCK - self.block.samples);
-            let (q_now, q_later) = q.split_at(taken);
-            let (force_now, force_later) = force.split_at(taken);
+            let first = self.block.samples;
+            let taken = q.len().min(BLOCK - first);
             let block = &mut *self.block;
-            dispatch(Take {
+            let good = dispatch(Take {
                 block,
-                q: q_now,
-                force: force_now,
+                q: &q[..taken],
+                force: &force[..taken],
             });
-            (q, force) = (q_later, force_later);
+            if !good {
+                return Err(self.without_bad(first).into());
+            }
+            (q, force) = (&q[taken..], &force[taken..]);
             if self.block.samples == BLOCK {
                 self.fold()?;
             }
@@ -72,12 +74,30 @@ impl<const N: usize> Stream<N> {
     /// The condensed problem of all samples.
     ///
     /// # Errors
-    /// [`NumericsError::NotFinite`](arm_numerics::NumericsError::NotFinite) as [`Stream::push`], for the samples of the last block.
+    /// [`NumericsError::NotFinite`] where the torques of a sample are too large.
     pub fn finish(mut self) -> Result<Condensed<N>, IdentError> {
         self.fold()?;
         Ok(Condensed {
             factor: self.condenser.finish(),
         })
+    }
+
+    /// Takes the first bad sample from a place of the block on, and all after it, out of the block; says what is wrong with it.
+    fn without_bad(&mut self, first: usize) -> NumericsError {
+        let block = &mut *self.block;
+        let columns = || block.links.iter().chain(&block.force);
+        let found = |place: usize| {
+            let values = columns().map(move |column| column.0[place]);
+            values.into_iter().find(|&v| !acceptable(&[v]))
+        };
+        let mut places = (first..block.samples).filter_map(|place| Some((place, found(place)?)));
+        let (place, found) = places.next().unwrap_or((first, f64::NAN));
+        block.samples = place;
+        NumericsError::NotFinite {
+            name: "samples",
+            index: self.condenser.rows() + place,
+            found,
+        }
     }
 
     /// Folds the samples that wait.
@@ -125,7 +145,7 @@ impl<const N: usize> Block<N> {
     }
 }
 
-/// Takes samples into a block with room for them.
+/// Takes samples into a block with room for them; returns whether all can be used.
 struct Take<'a, const N: usize> {
     block: &'a mut Block<N>,
     q: &'a [Joints<f64, N>],
@@ -133,15 +153,15 @@ struct Take<'a, const N: usize> {
 }
 
 impl<const N: usize> Computation for Take<'_, N> {
-    type Output = ();
+    type Output = bool;
 
     #[inline(always)]
-    fn call(self) {
+    fn call(self) -> bool {
         let Self { block, q, force } = self;
         let first = block.samples;
         block.samples += q.len();
         let places = first..block.samples;
-        for ((place, q), force) in places.zip(q).zip(force) {
+        for ((place, q), force) in places.clone().zip(q).zip(force) {
             let mut angle = 0.0;
             for (link, q) in block.links.iter_mut().zip(q.iter()) {
                 angle += q;
@@ -151,6 +171,8 @@ impl<const N: usize> Computation for Take<'_, N> {
                 column.0[place] = *force;
             }
         }
+        let mut columns = block.links.iter().chain(&block.force);
+        columns.all(|column| acceptable(&column.0[places.clone()]))
     }
 }
 
@@ -225,7 +247,7 @@ impl<const N: usize> Condensed<N> {
     /// dissipative torques are not among the unknowns.
     ///
     /// # Errors
-    /// [`NumericsError::TooFew`](arm_numerics::NumericsError::TooFew) for fewer samples than unknowns.
+    /// [`NumericsError::TooFew`] for fewer samples than unknowns.
     pub fn solve(&self, model: &Model<N>, bound_width: f64) -> Result<Cascade<N>, IdentError> {
         let mut unknowns = unknowns(model, bound_width);
         unknowns.retain(|u| match u.source {

@@ -55,3 +55,43 @@ fn the_stream_is_the_same_however_it_is_cut() {
         assert_eq!(a.to_bits(), b.to_bits(), "{a} and {b}");
     }
 }
+
+#[test]
+fn a_bad_sample_is_named_and_those_before_it_stand() {
+    let truth = sample_arms::mechanical_arm();
+    let (mut q, mut force) = samples(&truth);
+    let model = wrong(&truth, [[1.1, 0.95, 1.0], [0.92, 1.06, 1.0]], 0.1);
+    let solve = |stream: Stream<2>| {
+        let condensed = stream.finish().expect("finite samples");
+        condensed.solve(&model, 3.0).expect("a solution")
+    };
+    let mut good = Stream::new(&model.chain);
+    good.push(&q[..SAMPLES - 100], &force[..SAMPLES - 100])
+        .expect("finite samples");
+    let good = solve(good);
+    force[SAMPLES - 100][1] = f64::NAN;
+    let mut stream = Stream::new(&model.chain);
+    let error = stream
+        .push(&q, &force)
+        .expect_err("a force is not a number");
+    assert!(
+        error.to_string().contains(&(SAMPLES - 100).to_string()),
+        "{error}"
+    );
+    assert_eq!(solve(stream), good);
+    q[5][0] = 1e150;
+    let mut stream = Stream::new(&model.chain);
+    let error = stream.push(&q, &force).expect_err("an angle is too large");
+    assert!(error.to_string().contains('5'), "{error}");
+}
+
+#[test]
+fn blocks_that_are_full_leave_nothing_to_the_end() {
+    let truth = sample_arms::mechanical_arm();
+    let (q, force) = samples(&truth);
+    let mut stream = Stream::new(&truth);
+    stream
+        .push(&q[..256], &force[..256])
+        .expect("finite samples");
+    assert_eq!(stream.finish().expect("finite samples").samples(), 256);
+}

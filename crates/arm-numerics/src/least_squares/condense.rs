@@ -124,22 +124,23 @@ impl Condenser {
         Ok(())
     }
 
-    /// Adds up to [`BLOCK`] rows at once where no row waits; `false`, and nothing is done, where some do.
+    /// Adds up to [`BLOCK`] rows at once.
     ///
     /// * `rows` - their number
     /// * `write` - writes them into `p + 1` columns, the last of them b
     ///
     /// # Errors
     /// [`NumericsError::NotFinite`] as [`Condenser::push`]; then none of the rows is added.
+    ///
+    /// # Panics
+    /// Where rows of another call wait, since columns are written from their start, and for more than [`BLOCK`] rows.
     #[inline]
     pub fn push_panel(
         &mut self,
         rows: usize,
         write: impl FnOnce(&mut [Column]),
-    ) -> Result<bool, NumericsError> {
-        if self.waiting > 0 {
-            return Ok(false);
-        }
+    ) -> Result<(), NumericsError> {
+        assert_eq!(self.waiting, 0, "rows wait");
         write(&mut self.panel);
         for column in &self.panel {
             let column = &column.0[..rows];
@@ -157,7 +158,7 @@ impl Condenser {
         if rows == BLOCK {
             self.fold();
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Adds the problem of a factor, its residual included.
@@ -357,9 +358,9 @@ impl Computation for Accept<'_> {
     }
 }
 
-/// Whether all numbers are finite and small enough; false for NaN.
+/// Whether all numbers are finite and small enough to be added; false for NaN.
 #[inline(always)]
-fn acceptable(values: &[f64]) -> bool {
+pub fn acceptable(values: &[f64]) -> bool {
     values.iter().fold(true, |ok, v| ok & (v.abs() < LARGEST))
 }
 

@@ -1,5 +1,5 @@
 use crate::noise::{Noise, gap};
-use arm_numerics::least_squares::condense::{BLOCK, LARGEST};
+use arm_numerics::least_squares::condense::{BLOCK, Column, LARGEST};
 use arm_numerics::{Condenser, Factor, Matrix, NumericsError};
 use nalgebra::{DMatrix, DVector};
 
@@ -209,4 +209,41 @@ fn refuses_bad_rows_and_keeps_its_state() {
         message,
         "row holds NaN at index 1, expected a finite number"
     );
+}
+
+/// A panel that is not full is as good as its rows one by one; what is left in it counts for nothing, nor does one that was refused.
+#[test]
+fn part_of_a_panel_is_its_rows() {
+    let mut noise = Noise::new(8);
+    let (y, b) = (noise.matrix(BLOCK + 37, 3), noise.vector(BLOCK + 37));
+    let one_by_one = condensed(&y, &b);
+    let mut condenser = Condenser::new(3);
+    let write = |panel: &mut [Column], first: usize| {
+        for (j, column) in panel.iter_mut().enumerate() {
+            for (i, value) in column.0.iter_mut().enumerate() {
+                let row = first + i;
+                *value = match (row < b.len(), j) {
+                    (false, _) => f64::NAN,
+                    (true, 3) => b[row],
+                    (true, _) => y[(row, j)],
+                };
+            }
+        }
+    };
+    condenser
+        .push_panel(BLOCK, |panel| write(panel, 0))
+        .expect("finite numbers");
+    let refused = condenser.push_panel(38, |panel| write(panel, BLOCK));
+    assert!(matches!(
+        refused,
+        Err(NumericsError::NotFinite { index: BLOCK, .. })
+    ));
+    condenser
+        .push_panel(30, |panel| write(panel, BLOCK))
+        .expect("finite numbers");
+    for row in BLOCK + 30..BLOCK + 37 {
+        let values = [0, 1, 2].map(|j| y[(row, j)]);
+        condenser.push(&values, b[row]).expect("finite numbers");
+    }
+    assert_eq!(condenser.finish(), one_by_one);
 }

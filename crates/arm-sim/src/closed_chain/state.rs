@@ -99,8 +99,8 @@ impl<T: Scalar, const N: usize> State<T, N> {
         sum.is_finite()
     }
 
-    /// Goes on for a time by semi-implicit Euler: the speeds, and with the new ones the angles, `q + h (q̇ + h q̈)`, in the order in which
-    /// least waits for the accelerations.
+    /// Goes on for a time by semi-implicit Euler: the speeds, and with the new ones the angles. Computed as `(q + h q̇) + h² q̈`, whose
+    /// first sum need not wait for the accelerations.
     #[inline(always)]
     pub fn advance(&mut self, h: T, now: &Outcome<T, N>) {
         for i in 0..N {

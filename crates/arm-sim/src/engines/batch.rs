@@ -2,33 +2,20 @@
 
 use std::mem::discriminant;
 
-use arm_core::{Joints, Lanes, Plane, Pose, Scalar, Setup};
-
-use crate::closed_chain::branch_free::BranchFree;
-use crate::closed_chain::model::Model;
-use crate::closed_chain::state::{Input, Outcome, State};
-use crate::engines::native::{BranchFreeSteps, diverged};
-use crate::engines::packing::{
-    pack, pack_assistance, pack_effect, pack_input, pack_link, pack_setup,
-};
+use crate::engines::group::{Group, Outcomes};
 use crate::engines::simulate::simulate;
-use crate::integrators::divided_step::step_in_pieces;
-use crate::integrators::input_buffer::{Ahead, InputBuffer};
-use crate::integrators::step::{Inputs, Memory, step};
+use crate::integrators::input_buffer::InputBuffer;
 use crate::preparation::prepared_run::{Prepared, commands};
-use crate::recording::recorder::{Instant, Recorder, Row};
-use crate::{Experiment, Handle, Integrator, Recording, SimulationError};
-use arm_core::simd_dispatch::{Computation, dispatch, has_registers_of_eight};
+use crate::{Experiment, SimulationError};
+use arm_core::simd_dispatch::has_registers_of_eight;
 
-/// Most groups in a set: the drive is then computed once for so many.
+/// Most groups in a set: where one drive moves them, it is computed once for all.
 const GROUPS: usize = 8;
-
-type Outcomes<const N: usize> = Vec<Result<Recording<N>, SimulationError>>;
 
 /// Simulates many experiments; each has the bits of [`simulate`], whatever its neighbours and the number of threads.
 ///
-/// Neighbours that differ only in values (not in kinds of effects, steps, or the kind of drive) run side by side in one pass, as many
-/// as fit into a register of this processor; order similar experiments together.
+/// Neighbours that differ only in values (not in kinds of effects, steps, or the kind of drive) run side by side in one pass, eight of
+/// them with AVX-512, else four; order similar experiments together.
 pub fn simulate_batch<const N: usize>(
     experiments: &[Experiment<N>],
     threads: usize,
@@ -44,11 +31,9 @@ fn batch<const L: usize, const N: usize>(
     experiments: &[Experiment<N>],
     threads: usize,
 ) -> Outcomes<N> {
-    // Some sets for each thread, so that none waits long for the last.
     let groups = experiments.len().div_ceil(L);
-    let groups_in_set = groups.div_ceil(4 * threads.max(1)).clamp(1, GROUPS);
-    let sets: Vec<&[Experiment<N>]> = experiments.chunks(groups_in_set * L).collect();
-    let threads = threads.clamp(1, sets.len().max(1));
+    let threads = threads.clamp(1, groups.max(1));
+    let sets: Vec<&[Experiment<N>]> = sets::<L, _>(experiments, threads).collect();
     let mut done: Vec<Outcomes<N>> = Vec::new();
     if threads == 1 {
         done.extend(sets.into_iter().map(set::<L, N>));
@@ -75,6 +60,14 @@ fn batch<const L: usize, const N: usize>(
     done.into_iter().flatten().collect()
 }
 
+/// Runs in sets of at most [`GROUPS`] groups of `L`, as even as groups allow, and as many for each thread.
+fn sets<const L: usize, T>(runs: &[T], threads: usize) -> impl Iterator<Item = &[T]> {
+    let groups = runs.len().div_ceil(L);
+    let sets = threads * groups.div_ceil(threads * GROUPS);
+    let start = move |set: usize| (set * groups / sets * L).min(runs.len());
+    (0..sets).map(move |set| &runs[start(set)..start(set + 1)])
+}
+
 /// Some runs: side by side where neighbours are alike, else one by one.
 fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcomes<N> {
     let prepared: Vec<_> = experiments.iter().map(Prepared::new).collect();
@@ -83,15 +76,21 @@ fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcome
         (Ok(a), Ok(b)) => may_be_beside(a) && may_be_beside(b) && alike(a, b),
         _ => false,
     }) {
-        let first = outcomes.len();
-        if neighbours.len() == 1 {
-            outcomes.push(simulate(&experiments[first]));
+        let neighbours: Vec<_> = neighbours.iter().flatten().collect();
+        let groups: Vec<_> = neighbours.chunks(L).collect();
+        // A run that is alone, or was refused.
+        if neighbours.len() < 2 {
+            outcomes.push(simulate(&experiments[outcomes.len()]));
             continue;
         }
-        let neighbours: Vec<_> = neighbours.iter().flatten().collect();
-        match side_by_side::<L, N>(&neighbours) {
-            Ok(all) => outcomes.extend(all),
-            Err(error) => outcomes.extend(vec![Err(error); neighbours.len()]),
+        for together in
+            groups.chunk_by(|a, b| has_one_drive(a) && has_one_drive(b) && same_drive(a[0], b[0]))
+        {
+            // What the runs cannot do together, as for want of memory, each of them may do alone.
+            outcomes.extend(side_by_side::<L, N>(together).unwrap_or_else(|_| {
+                let alone = together.iter().copied().flatten();
+                alone.map(|run| simulate(run.experiment)).collect()
+            }));
         }
     }
     outcomes
@@ -125,35 +124,29 @@ fn same_drive<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && a.experiment.assistance == b.experiment.assistance
 }
 
-/// The run of a lane. A group of fewer runs than lanes repeats its last one in the lanes left over.
-fn in_lane<'a, 'b, const N: usize>(
-    prepared: &'b [&'b Prepared<'a, N>],
-    lane: usize,
-) -> &'b Prepared<'a, N> {
-    prepared[lane.min(prepared.len() - 1)]
+/// Whether one drive, without displacement, is that of all runs of a group.
+fn has_one_drive<const N: usize>(group: &[&Prepared<N>]) -> bool {
+    let mut all = group.iter();
+    all.all(|run| same_drive(run, group[0]) && run.setup.is_as_commanded())
 }
 
-/// Runs that are alike, in groups of as many as there are lanes, which go on together.
+/// Groups of at most `L` runs that go on together: one group, or several that one drive moves.
 fn side_by_side<const L: usize, const N: usize>(
-    prepared: &[&Prepared<N>],
+    groups: &[&[&Prepared<N>]],
 ) -> Result<Outcomes<N>, SimulationError> {
-    let (first, schedule) = (prepared[0], prepared[0].schedule);
-    let one_drive = prepared
-        .iter()
-        .all(|p| same_drive(p, first) && p.setup.is_as_commanded());
-    let groups = prepared.chunks(L);
+    let (first, schedule) = (groups[0][0], groups[0][0].schedule);
+    let one_drive = has_one_drive(groups[0]);
+    let runs = groups.iter().copied().flatten();
+    // Where the drive of any run breaks, every run makes its own step.
+    let mut broken: Vec<usize> = runs.flat_map(|p| p.discontinuities.steps()).collect();
+    broken.sort_unstable();
+    broken.dedup();
+    let mut broken = broken.into_iter().peekable();
+    let groups = groups.iter();
     let groups = groups.map(|runs| Group::<L, N>::new(runs, one_drive));
     let mut groups = groups.collect::<Result<Vec<_>, _>>()?;
     let mut common = InputBuffer::new(first.integrator());
     groups.iter_mut().for_each(|group| group.sample(0));
-    // Where the drive of any run breaks, every run makes its own step.
-    let mut broken: Vec<usize> = prepared
-        .iter()
-        .flat_map(|p| p.discontinuities.steps())
-        .collect();
-    broken.sort_unstable();
-    broken.dedup();
-    let mut broken = broken.into_iter().peekable();
     let (mut done, mut sampled) = (0, 0);
     while done < schedule.steps && groups.iter().any(Group::goes_on) {
         let next = done + 1;
@@ -176,373 +169,116 @@ fn side_by_side<const L: usize, const N: usize>(
         }
         if done == sampled + schedule.every {
             sampled = done;
-            groups.iter_mut().for_each(|group| group.sample(done));
+            let going = groups.iter_mut().filter(|group| group.goes_on());
+            going.for_each(|group| group.sample(done));
         }
     }
     Ok(groups.into_iter().flat_map(Group::finish).collect())
 }
 
-/// Runs in the lanes of one, on their way.
-struct Group<'a, 'b, const L: usize, const N: usize> {
-    prepared: &'b [&'b Prepared<'a, N>],
-    setup: Setup<Lanes<L>, N>,
-    model: Model<Lanes<L>, N>,
-    /// The rig, where it is plain.
-    plain: Option<BranchFree<Lanes<L>, N>>,
-    /// Whether one drive, without displacement, is that of all lanes.
-    one_drive: bool,
-    own: InputBuffer<Lanes<L>, N>,
-    /// Room for the commands of each lane.
-    commanded: [Vec<Input<f64, N>>; L],
-    state: State<Lanes<L>, N>,
-    memory: Memory<Lanes<L>>,
-    row: Row<Lanes<L>>,
-    recorders: Vec<Recorder<'b, 'static, N>>,
-    /// Why a run stopped early.
-    stopped: Vec<Option<SimulationError>>,
-}
-
-impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
-    fn new(prepared: &'b [&'b Prepared<'a, N>], one_drive: bool) -> Result<Self, SimulationError> {
-        let lane = |i: usize| in_lane(prepared, i);
-        let first = prepared[0];
-        let setup: Setup<Lanes<L>, N> = pack_setup(lane);
-        let effects =
-            (0..first.model.effects.len()).map(|e| pack_effect(|i| &lane(i).model.effects[e]));
-        let mut model = Model::new(&setup, pack_link(lane, setup.contact), effects.collect())?;
-        model.heaves = first.model.heaves;
-        let assistance = pack_assistance(|i| lane(i).experiment.assistance.as_ref());
-        if let Some([stiffness, damping]) = assistance {
-            model.assist(stiffness, damping);
-        }
-        Ok(Self {
-            prepared,
-            plain: model.plain(),
-            one_drive,
-            own: InputBuffer::new(first.integrator()),
-            commanded: [const { Vec::new() }; L],
-            state: State {
-                q: Joints::from_fn(|j, _| pack(|i| lane(i).start.0[j])),
-                qd: Joints::from_fn(|j, _| pack(|i| lane(i).start.1[j])),
-                work: [Lanes::ZERO; 4],
-            },
-            memory: Memory::new(model.effects.len()),
-            row: Row::new(),
-            recorders: prepared
-                .iter()
-                .map(|run| Recorder::new(run))
-                .collect::<Result<_, _>>()?,
-            stopped: vec![None; prepared.len()],
-            setup,
-            model,
-        })
-    }
-
-    /// Whether any of the runs has not stopped early.
-    fn goes_on(&self) -> bool {
-        self.stopped.iter().any(Option::is_none)
-    }
-
-    /// Records the runs that go on, after a number of steps.
-    fn sample(&mut self, steps: usize) {
-        let time = self.prepared[0].schedule.time(steps);
-        let input = if self.one_drive {
-            self.prepared[0].input(time).wide()
-        } else {
-            pack_input(|i| in_lane(self.prepared, i).input(time))
-        };
-        let instant = Instant {
-            model: &self.model,
-            input: &input,
-            state: &self.state,
-            memory: &self.memory.state,
-        };
-        self.row.fill(&instant, self.prepared[0].experiment.columns);
-        let recorders = self.recorders.iter_mut().zip(&self.stopped).enumerate();
-        for (i, (recorder, stopped)) in recorders {
-            if stopped.is_none() {
-                // Whole recordings never break off.
-                let _ = recorder.push(&self.row, |all| all.0[i]);
-            }
-        }
-    }
-
-    /// Makes some steps from number `next` on, or those until all runs have stopped.
-    ///
-    /// * `drive` - of these steps, where one drives all runs
-    fn advance(&mut self, next: usize, steps: usize, drive: Option<Ahead<f64, N>>) {
-        let mut made = 0;
-        while made < steps && self.goes_on() {
-            made += match drive {
-                Some(ahead) => self.advance_along(ahead.after(made)),
-                None => self.advance_apart(next + made, steps - made),
-            };
-            self.stop_diverged(next - 1 + made);
-        }
-    }
-
-    /// Makes steps along one drive of all lanes; returns how many.
-    fn advance_along(&mut self, ahead: Ahead<f64, N>) -> usize {
-        let (plain, first) = (self.plain.as_ref(), self.prepared[0]);
-        let steps = Steps::of(&self.model, plain, first);
-        let at = (&mut self.state, &mut self.memory);
-        dispatch(Advance { steps, ahead, at })
-    }
-
-    /// Makes steps from number `next` on, at most `most`, each lane along its own drive; returns how many.
-    fn advance_apart(&mut self, next: usize, most: usize) -> usize {
-        let (prepared, first) = (self.prepared, self.prepared[0]);
-        let (commanded, setup) = (&mut self.commanded, &self.setup);
-        let ahead = self.own.ahead(next, most, |half_steps, out| {
-            for (i, inputs) in commanded.iter_mut().enumerate() {
-                inputs.clear();
-                let experiment = in_lane(prepared, i).experiment;
-                commands(experiment, &first.schedule, half_steps, inputs);
-            }
-            for at in 0..half_steps.len() {
-                let mut input = pack_input(|i| commanded[i][at]);
-                input.stands_as_in(setup);
-                out.push(input);
-            }
-        });
-        let steps = Steps::of(&self.model, self.plain.as_ref(), first);
-        let at = (&mut self.state, &mut self.memory);
-        dispatch(Advance { steps, ahead, at })
-    }
-
-    /// One step of each run by itself.
-    fn step_apart(&mut self, number: usize) {
-        let (state, memory) = (&mut self.state, &mut self.memory);
-        let mut lane_memory = Memory::new(memory.state.len());
-        for i in 0..L {
-            let run = in_lane(self.prepared, i);
-            let mut lane = state.lane(i);
-            let lanes = memory.state.as_flattened_mut();
-            for (one, all) in lane_memory.state.as_flattened_mut().iter_mut().zip(&*lanes) {
-                *one = all.0[i];
-            }
-            step_in_pieces(run, number, (&mut lane, &mut lane_memory));
-            state.set_lane(i, &lane);
-            for (one, all) in lane_memory.state.as_flattened().iter().zip(lanes) {
-                all.0[i] = *one;
-            }
-        }
-        self.stop_diverged(number);
-    }
-
-    /// Stops the runs whose state is no longer finite after a number of steps.
-    fn stop_diverged(&mut self, done: usize) {
-        if self.state.is_finite() {
-            return;
-        }
-        for (i, stop) in self.stopped.iter_mut().enumerate() {
-            if let (None, Some(joint)) = (&stop, diverged(&self.state.lane(i))) {
-                *stop = Some(SimulationError::Diverged {
-                    step: done,
-                    time: self.prepared[0].schedule.time(done),
-                    joint,
-                });
-            }
-        }
-    }
-
-    fn finish(self) -> Outcomes<N> {
-        let recordings = self.recorders.into_iter().map(Recorder::finish);
-        recordings
-            .zip(self.stopped)
-            .map(|(recording, stopped)| stopped.map_or(Ok(recording), Err))
-            .collect()
-    }
-}
-
-/// What steps are made of, whatever drives them.
-struct Steps<'a, const L: usize, const N: usize> {
-    model: &'a Model<Lanes<L>, N>,
-    /// The rig, where it is plain.
-    plain: Option<&'a BranchFree<Lanes<L>, N>>,
-    integrator: Integrator,
-    h: f64,
-}
-
-impl<'a, const L: usize, const N: usize> Steps<'a, L, N> {
-    /// The steps of runs like one of them.
-    fn of(
-        model: &'a Model<Lanes<L>, N>,
-        plain: Option<&'a BranchFree<Lanes<L>, N>>,
-        run: &Prepared<N>,
-    ) -> Self {
-        Self {
-            model,
-            plain,
-            integrator: run.integrator(),
-            h: run.schedule.dt,
-        }
-    }
-}
-
-/// Some steps of all lanes, to the end or to the first after which a state is not finite.
-struct Advance<'a, T, const L: usize, const N: usize> {
-    steps: Steps<'a, L, N>,
-    ahead: Ahead<'a, T, N>,
-    at: (&'a mut State<Lanes<L>, N>, &'a mut Memory<Lanes<L>>),
-}
-
-impl<T: Scalar, const L: usize, const N: usize> Computation for Advance<'_, T, L, N>
-where
-    Input<T, N>: Drives<L, N>,
-{
-    /// The number of steps made.
-    type Output = usize;
-
-    #[inline(always)]
-    fn call(self) -> usize {
-        let Self {
-            steps,
-            ahead,
-            at: (state, memory),
-        } = self;
-        let Some(rig) = steps.plain else {
-            for number in 0..ahead.steps {
-                let inputs = ahead.step(number);
-                let [start, middle, end] =
-                    [inputs.start, inputs.middle, inputs.end].map(Drives::wide);
-                let inputs = Inputs {
-                    start: &start,
-                    middle: &middle,
-                    end: &end,
-                };
-                let at = (&mut *state, &mut *memory);
-                step(steps.model, steps.integrator, steps.h, inputs, at);
-                if !state.is_finite() {
-                    return number + 1;
-                }
-            }
-            return ahead.steps;
-        };
-        // A copy of which nobody else knows: without it the compiler must fear that the rig changes with the state.
-        let (rig, h) = (*rig, steps.h);
-        Abreast { rig, ahead, h }.advance(steps.integrator, ahead.steps, state)
-    }
-}
-
-/// Steps of plain rigs in lanes.
-struct Abreast<'a, T, const L: usize, const N: usize> {
-    rig: BranchFree<Lanes<L>, N>,
-    ahead: Ahead<'a, T, N>,
-    h: f64,
-}
-
-impl<T: Scalar, const L: usize, const N: usize> BranchFreeSteps<Lanes<L>, N>
-    for Abreast<'_, T, L, N>
-where
-    Input<T, N>: Drives<L, N>,
-{
-    #[inline(always)]
-    fn h(&self) -> f64 {
-        self.h
-    }
-
-    /// One loop over lanes around all of it, of which the compiler makes vectors.
-    #[inline(always)]
-    fn first_order(&self, step: usize, state: &mut State<Lanes<L>, N>) {
-        let input = self.ahead.step(step).start;
-        let pose = Pose::new(&state.q);
-        // Into another place: what a lane writes is nothing that another one reads.
-        let mut next = *state;
-        for i in 0..L {
-            let mut lane = state.lane(i);
-            let rig = self.rig.lane(i);
-            let now = rig.evaluate(&input.handle(i), &pose.lane(i), [&lane.q, &lane.qd]);
-            lane.advance(self.h, &now);
-            next.set_lane(i, &lane);
-        }
-        *state = next;
-    }
-
-    #[inline(always)]
-    fn evaluate(
-        &self,
-        step: usize,
-        stage: usize,
-        [q, qd]: [&Joints<Lanes<L>, N>; 2],
-    ) -> Outcome<Lanes<L>, N> {
-        // Copies of which nobody else knows, as of the rig.
-        let (input, q, qd) = (*self.ahead.step(step).at_stage(stage), *q, *qd);
-        let pose = Pose::new(&q);
-        let mut all = Outcome::none();
-        for i in 0..L {
-            let rig = self.rig.lane(i);
-            // Not by `map`, which would copy every lane.
-            let q = Joints::from_fn(|j, _| q[j].0[i]);
-            let qd = Joints::from_fn(|j, _| qd[j].0[i]);
-            let one = rig.evaluate(&input.handle(i), &pose.lane(i), [&q, &qd]);
-            all.set_lane(i, &one);
-        }
-        all
-    }
-}
-
-/// What drives all lanes, the same for each or not.
-trait Drives<const L: usize, const N: usize>: Copy {
-    fn wide(&self) -> Input<Lanes<L>, N>;
-    /// The handle of one lane.
-    fn handle(&self, lane: usize) -> Handle<f64>;
-}
-
-impl<const L: usize, const N: usize> Drives<L, N> for Input<f64, N> {
-    #[inline(always)]
-    fn wide(&self) -> Input<Lanes<L>, N> {
-        pack_input(|_| *self)
-    }
-    #[inline(always)]
-    fn handle(&self, _: usize) -> Handle<f64> {
-        self.handle
-    }
-}
-
-impl<const L: usize, const N: usize> Drives<L, N> for Input<Lanes<L>, N> {
-    #[inline(always)]
-    fn wide(&self) -> Input<Lanes<L>, N> {
-        *self
-    }
-    #[inline(always)]
-    fn handle(&self, lane: usize) -> Handle<f64> {
-        let plane = |of: &Plane<Lanes<L>>| [of[0].0[lane], of[1].0[lane]];
-        Handle {
-            position: plane(&self.handle.position),
-            velocity: plane(&self.handle.velocity),
-            acceleration: plane(&self.handle.acceleration),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Outcomes, batch};
-    use crate::{Experiment, sample_experiments, simulate};
+    use arm_core::effect::{Effect, Kind};
+    use arm_core::{Limits, Shape, sample_arms};
 
-    /// Runs that differ in their masses; one in the middle is of another length, and so not like its neighbours.
-    fn runs() -> Vec<Experiment<3>> {
+    use super::{GROUPS, Outcomes, batch, sets};
+    use crate::{
+        Coupling, Drive, Experiment, HandlePath, Integrator, Movement, sample_experiments, simulate,
+    };
+
+    /// Runs of several sets, which differ in their masses.
+    fn runs(integrator: Integrator) -> Vec<Experiment<3>> {
         let run = |i: u32| {
-            let duration = if i == 21 { 0.1 } else { 0.2 };
-            let mut run = sample_experiments::human_experiment(duration, [0.0; 3]).expect("valid");
+            let mut run = sample_experiments::human_experiment(0.1, [0.0; 3]).expect("valid");
+            run.integrator = integrator;
             for segment in &mut run.setup.segments {
                 segment.mass *= 1.0 + 0.01 * f64::from(i);
             }
             run
         };
-        (0..43).map(run).collect()
+        (0..75).map(run).collect()
     }
 
     /// A processor takes one of the two numbers of lanes; here are both.
-    #[test]
-    fn every_number_of_lanes_records_what_single_runs_do() {
-        let runs = runs();
-        let alone: Outcomes<3> = runs.iter().map(simulate).collect();
-        assert!(alone.iter().all(Result::is_ok));
-        for threads in [1, 3] {
-            assert_eq!(batch::<4, 3>(&runs, threads), alone, "4 lanes");
-            assert_eq!(batch::<8, 3>(&runs, threads), alone, "8 lanes");
+    fn as_alone(change: impl Fn(usize, &mut Experiment<3>)) {
+        for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4] {
+            let mut runs = runs(integrator);
+            for (i, run) in runs.iter_mut().enumerate() {
+                change(i, run);
+            }
+            let alone: Outcomes<3> = runs.iter().map(simulate).collect();
+            for threads in [1, 3] {
+                assert_eq!(batch::<4, 3>(&runs, threads), alone, "4 lanes");
+                assert_eq!(batch::<8, 3>(&runs, threads), alone, "8 lanes");
+            }
         }
+    }
+
+    fn lead_at(speed: f64, coupling: Coupling, run: &mut Experiment<3>) {
+        let limits = Limits {
+            speed,
+            acceleration: 20.0 * speed,
+        };
+        let waypoints = [[-1.0, 0.7, 0.1], [-0.9, 0.75, 0.1]].map(Into::into);
+        let movement = Movement::within(Shape::Trapezoid, &waypoints, &[limits; 3], 0.0);
+        let movement = movement.expect("valid");
+        let path = HandlePath::of_arm(sample_arms::human_arm(), movement);
+        run.drive = Drive::Handle { path, coupling };
+    }
+
+    #[test]
+    fn one_drive_of_all_runs() {
+        as_alone(|_, _| ());
+    }
+
+    #[test]
+    fn a_run_of_another_length_or_that_is_refused() {
+        as_alone(|i, run| match i {
+            21 => run.duration = 0.05,
+            40 => run.setup.contact.stiffness[0] = -1.0,
+            _ => (),
+        });
+    }
+
+    #[test]
+    fn half_of_the_runs_along_another_path() {
+        as_alone(|i, run| {
+            if i > 37 {
+                lead_at(1.1, Coupling::Compliant, run);
+            }
+        });
+    }
+
+    #[test]
+    fn each_run_along_a_path_of_its_own_whose_corners_lie_between_steps() {
+        for coupling in [Coupling::Compliant, Coupling::Rigid] {
+            as_alone(|i, run| lead_at(1.0 + 0.013 * i as f64, coupling, run));
+        }
+    }
+
+    #[test]
+    fn runs_that_diverge_beside_others() {
+        as_alone(|i, run| {
+            // All lanes of one group, and one lane of others.
+            if (24..32).contains(&i) || i == 50 {
+                let wild = Effect::new(Kind::Viscous, 1).with(&[-1e4 - 1e3 * i as f64]);
+                run.effects = vec![wild; 1];
+            } else {
+                run.effects = vec![Effect::new(Kind::Viscous, 1).with(&[0.2])];
+            }
+        });
+    }
+
+    #[test]
+    fn sets_are_even_and_hold_all_runs_in_order() {
+        for (count, threads) in [(0, 1), (1, 4), (75, 1), (75, 3), (577, 2), (640, 7)] {
+            let runs: Vec<usize> = (0..count).collect();
+            let sets: Vec<_> = sets::<8, _>(&runs, threads).collect();
+            assert_eq!(sets.concat(), runs, "{count} runs, {threads} threads");
+            assert!(sets.iter().all(|set| set.len() <= 8 * GROUPS));
+        }
+        let runs = [(); 80];
+        let lengths: Vec<usize> = sets::<8, _>(&runs, 2).map(<[()]>::len).collect();
+        assert_eq!(lengths, [40, 40]);
     }
 }

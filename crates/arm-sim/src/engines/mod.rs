@@ -2,6 +2,7 @@
 
 pub(crate) mod accuracy;
 pub(crate) mod batch;
+mod group;
 pub(crate) mod native;
 mod packing;
 #[cfg(feature = "rapier")]
