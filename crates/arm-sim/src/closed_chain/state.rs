@@ -99,14 +99,15 @@ impl<T: Scalar, const N: usize> State<T, N> {
         sum.is_finite()
     }
 
-    /// Goes on for a time by semi-implicit Euler: the speeds, and with the new ones the angles. Computed as `(q + h q̇) + h² q̈`, whose
-    /// first sum need not wait for the accelerations.
+    /// Goes on for a time by semi-implicit Euler: first the speeds, and with the new ones the angles. The sum `(q + h q̇) + h² q̈` would wait
+    /// less, but rounds the angle twice, and fits by differences of runs then take 1.6 times as long.
     #[inline(always)]
     pub fn advance(&mut self, h: T, now: &Outcome<T, N>) {
         for i in 0..N {
-            let coasted = self.q[i] + h * self.qd[i];
-            self.q[i] = coasted + h * h * now.qdd[i];
             self.qd[i] += h * now.qdd[i];
+        }
+        for i in 0..N {
+            self.q[i] += h * self.qd[i];
         }
         for i in 0..4 {
             self.work[i] += h * now.power[i];
