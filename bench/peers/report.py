@@ -57,12 +57,12 @@ def words(result: dict[str, Any]) -> str:
     ]
     if result["missing"]:
         lines += ["Not measured: " + "; ".join(f"{tool} ({reason})" for tool, reason in result["missing"].items()) + ".", ""]
-    lines += ["### Goals", "", "| ratio | found | aimed at | | a hand-written loop, nothing fused |", "| --- | --- | --- | --- | --- |"]
+    lines += ["### Goals", "", "| ratio | found | aimed at | | limit, nothing fused |", "| --- | --- | --- | --- | --- |"]
     for goal in result["goals"]:
         found = "not measured" if goal["found"] is None else f"{goal['found']:.3g}".replace("-", "−")
         mark = {None: "", True: "met", False: "**not met**"}[goal["met"]]
-        bound = "" if goal.get("bound") is None else f"{goal['bound']:.3g}"
-        lines.append(f"| {goal['what']} | {found} | {'≤' if goal['at_most'] else '≥'} {goal['limit']:g} | {mark} | {bound} |")
+        unfused = "" if goal.get("unfused") is None else f"{goal['unfused']:.3g}"
+        lines.append(f"| {goal['what']} | {found} | {'≤' if goal['at_most'] else '≥'} {goal['limit']:g} | {mark} | {unfused} |")
     lines += _imports(middle)
     for workload, title in TITLES.items():
         lines += ["", f"### {title}", "", *_table(workload, result, middle)]

@@ -195,30 +195,30 @@ class Goal:
     limit: float
     at_most: bool
     beyond: str | None = None
-    bound: str | None = None
-    """The hand-written loop with nothing fused, in place of what is above the fraction: what the promise of equal bits leaves."""
+    unfused: str | None = None
+    """Key of the hand-written loop without fused operations, which replaces the numerator: armrs promises equal bits and cannot fuse."""
 
     def judge(self, medians: dict[str, float]) -> dict[str, object]:
         """Return the goal with what was found; None where a tool is missing."""
-        value = bound = None
+        value = unfused = None
         if all(key in medians for key in (self.over, self.under, self.beyond) if key):
             value = (medians[self.over] - (medians[self.beyond] if self.beyond else 0.0)) / (medians[self.under] if self.under else 1.0)
-        if self.bound in medians and self.under in medians:
-            bound = medians[self.bound] / medians[self.under]
+        if self.unfused in medians and self.under in medians:
+            unfused = medians[self.unfused] / medians[self.under]
         met = None if value is None else (value <= self.limit if self.at_most else value >= self.limit)
         return {
             "line": self.line,
             "what": self.what,
             "found": value,
-            "bound": bound,
+            "unfused": unfused,
             "limit": self.limit,
             "at_most": self.at_most,
             "met": met,
         }
 
 
-def _most(line: int, what: str, over: str, under: str | None, limit: float, bound: str | None = None) -> Goal:
-    return Goal(line, what, over, under, limit, True, bound=bound and f"{bound}/limit, nothing fused")
+def _most(line: int, what: str, over: str, under: str | None, limit: float, unfused: str | None = None) -> Goal:
+    return Goal(line, what, over, under, limit, True, unfused=unfused and f"{unfused}/limit, nothing fused")
 
 
 def _least(line: int, what: str, over: str, under: str, limit: float) -> Goal:

@@ -117,15 +117,15 @@ pub fn accelerations<T: Scalar, const N: usize>(
 /// What an arm in one state opposes to any load: its inertia matrix in link angles, factorised, and what its speeds demand, so that another
 /// load in the same state costs less.
 ///
-/// The factors are those of `L D Lᵀ`, but for the last two links of an arm of three and more: what the links before leave of their block is
-/// inverted. Every pivot needs a division, which waits for that of the pivot before; the block needs one for both.
+/// `L D Lᵀ`, except that with three or more links the 2 × 2 Schur complement of the last two is inverted directly: one division instead of
+/// two that depend on each other.
 #[derive(Clone, Copy, Debug)]
 pub struct Resistance<T, const N: usize> {
     /// `L D` up to the diagonal, by rows; the last block as the links before leave it.
     matrix: [[T; N]; N],
     /// One over `D` of the links that are eliminated one by one.
     reciprocal: [T; N],
-    /// The inverse of the last block: first of its diagonal, opposite of what is beside it, last of its diagonal.
+    /// Inverse of the Schur complement `[[a, b], [b, c]]` as `[c, b, a] / (ac − b²)`, beside the diagonal without its minus sign.
     last: [T; 3],
     /// `C q̇` of each link \[N m\].
     demand: [T; N],

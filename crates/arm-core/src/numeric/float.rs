@@ -61,10 +61,11 @@ impl Real for f32 {
     }
 }
 
-/// Sines and cosines of many angles \[rad\]. In one pass without a branch, which the compiler makes for several at once where it can.
+/// Sines and cosines of many angles \[rad\]: one pass without a branch, which the compiler vectorises. Where any angle is beyond the short
+/// reduction, all are computed again one by one.
 ///
 /// # Panics
-/// Where `sines` or `cosines` are fewer than the angles.
+/// Where `sines` or `cosines` is shorter than `angles`.
 #[inline(always)]
 pub fn write_sines_and_cosines(angles: &[f64], [sines, cosines]: [&mut [f64]; 2]) {
     let count = angles.len();
@@ -147,7 +148,7 @@ impl Scalar for f64 {
     #[cfg_attr(not(target_os = "none"), inline)]
     fn sin_cos(self) -> (Self, Self) {
         if self.abs() <= LARGEST_REDUCED {
-            // A device takes every instruction in turn, and has little room for them.
+            // A microcontroller executes in order and has little program memory.
             if cfg!(target_os = "none") {
                 turned(reduced_sin_cos(self, &DOUBLE))
             } else {

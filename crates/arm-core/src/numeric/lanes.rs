@@ -110,7 +110,7 @@ impl<const L: usize> Scalar for Lanes<L> {
         let [[sin], [cos]] = Self::sines_and_cosines(&[self]);
         (sin, cos)
     }
-    /// One loop over all lanes of all angles: long enough for the compiler to keep it a loop, of which it makes the widest vectors.
+    /// One loop over all lanes of all angles: long enough that the compiler vectorises it at full width instead of unrolling it.
     #[inline(always)]
     fn sines_and_cosines<const K: usize>(angles: &[Self; K]) -> [[Self; K]; 2] {
         let (mut all, mut sines, mut cosines) = ([[0.0; L]; K], [[0.0; L]; K], [[0.0; L]; K]);

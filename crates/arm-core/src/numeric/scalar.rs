@@ -7,8 +7,8 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// Implemented for `f64`, `f32` and [`Lanes`](crate::Lanes). Every operation is elementwise and has the same bits on
 /// every platform: `+ − × ÷ √` are exact by IEEE 754, `sin_cos`, `exp` and `tanh` are polynomials written here (in `f32`
 /// the last two are `libm`'s), the rest is `libm`.
-/// There is no branch on a value but [`Scalar::if_less`], so that lanes and single runs take the same steps. Inside of `sin_cos` and `tanh` a
-/// single number may take a branch, whose ways have the same bits.
+/// There is no branch on a value but [`Scalar::if_less`], so that lanes and single runs take the same steps. The scalar
+/// versions of `sin_cos`, `exp` and `tanh` branch on their argument; all branches give the same bits.
 pub trait Scalar:
     nalgebra::Scalar
     + Copy

@@ -1,5 +1,5 @@
-//! Sine, cosine, exponential and hyperbolic tangent by polynomials, for one number or many at once. A single number may take a branch
-//! that many do not; both have the same bits.
+//! Sine, cosine, exponential and hyperbolic tangent by polynomials, for one number or many at once. The scalar versions branch on their
+//! argument; all branches give the same bits.
 
 use crate::Scalar;
 
@@ -82,8 +82,8 @@ pub(crate) fn reduced_sin_cos<T: Scalar, const S: usize, const C: usize>(
     polynomials(quarters, r, k)
 }
 
-/// Sine and cosine of a single number. The same bits as [`turned`] of [`reduced_sin_cos`], but with branches on the quarter turn: along a
-/// motion it is that of the moment before, and a processor that expects it goes on without waiting for the reduction.
+/// Sine and cosine of a single number, with the bits of [`turned`] and [`reduced_sin_cos`], but with branches on the quarter turn. Along a
+/// motion it rarely changes, so that branch prediction hides the latency of the argument reduction.
 #[inline]
 pub(crate) fn expected_sin_cos(x: f64) -> (f64, f64) {
     let k = &DOUBLE;

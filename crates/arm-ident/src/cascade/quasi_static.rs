@@ -43,7 +43,9 @@ impl<const N: usize> Stream<N> {
     /// * `force_on_arm` - at the tip \[N\]
     ///
     /// # Errors
-    /// [`NumericsError::Length`]; [`NumericsError::NotFinite`] for the first sample with a number that is not finite or too large. The samples before it stand.
+    /// [`NumericsError::Length`]; [`NumericsError::NotFinite`] with the index (from 0) of the first sample whose angle or force is not finite or
+    /// too large; earlier samples are kept. If a torque of a full block is too large, the block is discarded, and the index is that of its
+    /// first sample.
     pub fn push(
         &mut self,
         q: &[Joints<f64, N>],

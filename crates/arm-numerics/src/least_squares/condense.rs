@@ -24,7 +24,7 @@ pub const LARGEST: f64 = 1e140;
 /// Sums of squares below this are taken as zero, as their inverse would overflow.
 const NOTHING: f64 = 1e-280;
 
-/// One column of a panel, where vectors of any width lie within one line of the cache.
+/// One column of a panel, aligned so that no vector crosses a cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub struct Column(pub [f64; BLOCK]);
@@ -133,7 +133,7 @@ impl Condenser {
     /// [`NumericsError::NotFinite`] as [`Condenser::push`]; then none of the rows is added.
     ///
     /// # Panics
-    /// Where rows of another call wait, since columns are written from their start, and for more than [`BLOCK`] rows.
+    /// If an earlier call left a partly filled panel, or for more than [`BLOCK`] rows.
     #[inline]
     pub fn push_panel(
         &mut self,
@@ -364,8 +364,8 @@ pub fn acceptable(values: &[f64]) -> bool {
     values.iter().fold(true, |ok, v| ok & (v.abs() < LARGEST))
 }
 
-/// Dot products of a column with some others. Written with vectors, since the compiler would make half as wide ones of the partial sums;
-/// their number does not depend on the width, and so neither do the bits.
+/// Dot products of a column with some others. Explicit vectors, because the compiler uses half-width ones for the partial sums. There are
+/// always [`LANES`] partial sums, whatever the width, so the bits are the same.
 #[inline(always)]
 fn dots<S: Simd, const C: usize>(simd: S, a: &Column, others: &[Column; C]) -> [f64; C] {
     let vectors = LANES / S::F64_LANES;

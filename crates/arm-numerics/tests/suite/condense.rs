@@ -211,7 +211,7 @@ fn refuses_bad_rows_and_keeps_its_state() {
     );
 }
 
-/// A panel that is not full is as good as its rows one by one; what is left in it counts for nothing, nor does one that was refused.
+/// A partly filled panel gives the factor of its rows pushed one by one. Values beyond its rows, and refused panels, have no effect.
 #[test]
 fn part_of_a_panel_is_its_rows() {
     let mut noise = Noise::new(8);

@@ -9,7 +9,7 @@ use crate::preparation::prepared_run::{Prepared, commands};
 use crate::{Experiment, SimulationError};
 use arm_core::simd_dispatch::has_registers_of_eight;
 
-/// Most groups in a set: where one drive moves them, it is computed once for all.
+/// Most groups in a set. If they share a drive, it is computed once for all.
 const GROUPS: usize = 8;
 
 /// Simulates many experiments; each has the bits of [`simulate`], whatever its neighbours and the number of threads.
@@ -60,7 +60,7 @@ fn batch<const L: usize, const N: usize>(
     done.into_iter().flatten().collect()
 }
 
-/// Runs in sets of at most [`GROUPS`] groups of `L`, as even as groups allow, and as many for each thread.
+/// Runs in sets of at most [`GROUPS`] groups of `L`, of nearly equal size; every thread gets the same number of sets.
 fn sets<const L: usize, T>(runs: &[T], threads: usize) -> impl Iterator<Item = &[T]> {
     let groups = runs.len().div_ceil(L);
     let sets = threads * groups.div_ceil(threads * GROUPS);
@@ -86,7 +86,7 @@ fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcome
         for together in
             groups.chunk_by(|a, b| has_one_drive(a) && has_one_drive(b) && same_drive(a[0], b[0]))
         {
-            // What the runs cannot do together, as for want of memory, each of them may do alone.
+            // Where the runs fail together, for example for want of memory, each is run by itself.
             outcomes.extend(side_by_side::<L, N>(together).unwrap_or_else(|_| {
                 let alone = together.iter().copied().flatten();
                 alone.map(|run| simulate(run.experiment)).collect()
@@ -199,7 +199,7 @@ mod tests {
         (0..75).map(run).collect()
     }
 
-    /// A processor takes one of the two numbers of lanes; here are both.
+    /// `simulate_batch` chooses 4 or 8 lanes by the processor; here both are compared with single runs.
     fn as_alone(change: impl Fn(usize, &mut Experiment<3>)) {
         for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4] {
             let mut runs = runs(integrator);

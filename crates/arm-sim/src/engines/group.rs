@@ -117,7 +117,7 @@ impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
 
     /// Makes some steps from number `next` on, or those until all runs have stopped.
     ///
-    /// * `drive` - of these steps, where one drives all runs
+    /// * `drive` - of these steps if all runs share it, else `None`
     pub fn advance(&mut self, next: usize, steps: usize, drive: Option<Ahead<f64, N>>) {
         let mut made = 0;
         while made < steps && self.goes_on() {

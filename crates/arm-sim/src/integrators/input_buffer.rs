@@ -27,7 +27,7 @@ pub(crate) struct Ahead<'a, T, const N: usize> {
 }
 
 impl<T: Scalar, const N: usize> Ahead<'_, T, N> {
-    /// The drive of the steps after so many.
+    /// The drive of the steps that remain after some.
     pub fn after(self, steps: usize) -> Self {
         Self {
             steps: self.steps - steps,
