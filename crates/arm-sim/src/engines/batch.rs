@@ -77,12 +77,12 @@ fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcome
         _ => false,
     }) {
         let neighbours: Vec<_> = neighbours.iter().flatten().collect();
-        let groups: Vec<_> = neighbours.chunks(L).collect();
         // A run that is alone, or was refused.
         if neighbours.len() < 2 {
             outcomes.push(simulate(&experiments[outcomes.len()]));
             continue;
         }
+        let groups: Vec<_> = neighbours.chunks(L).collect();
         for together in
             groups.chunk_by(|a, b| has_one_drive(a) && has_one_drive(b) && same_drive(a[0], b[0]))
         {
