@@ -23,6 +23,9 @@ const ENOUGH: f64 = 0.2;
 const SHARE: f64 = 1e-4;
 /// The same to first order, as a share of that.
 const FIRST_ORDER_SHARE: f64 = 0.25;
+/// A fit is given up where so many times the first-order gain of a whole step would not lower the cost to what it is fitted for: the
+/// response to strong effects is not linear.
+const HOPE: f64 = 4.0;
 /// A step that gains less than so many times as much leads so near that the next one takes its slopes.
 const NEAR: f64 = 30.0;
 /// Maximum number of further fits in [`PreparedSession::fit_on`], each from the end of the fit before.
@@ -153,6 +156,19 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
     ) -> Result<FittedHypothesis<N>, GapError> {
+        self.fit_towards(point, (start, asked), f64::INFINITY)
+    }
+
+    /// The same, given up where the cost will not come down to `aim`.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::fit`].
+    pub(crate) fn fit_towards(
+        &self,
+        point: &LinearizationPoint<N>,
+        (start, asked): (Hypothesis<N>, Vec<Candidate>),
+        aim: f64,
+    ) -> Result<FittedHypothesis<N>, GapError> {
         let mut fitted = self.state(point, start, asked)?;
         let mut slopes: Option<Vec<Response>> = None;
         let mut lightest: usize = 0;
@@ -168,6 +184,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let (coordinates, clusters) =
                 self.equations_with(point, &fitted, (&each, &Columns::default()));
             let equations = Equations::new(&clusters, hypothesis, &coordinates);
+            if equations.is_hopeless(fitted.cost, aim) {
+                break;
+            }
             let next = |step: &Step| {
                 let moved = step.from(hypothesis, &coordinates);
                 let next = self.state(point, moved, fitted.asked.clone()).ok()?;
@@ -197,16 +216,18 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         Ok(fitted)
     }
 
-    /// Continues a fit from where an undamped step leads, even if the cost is higher there; keeps the result if its cost is lower.
+    /// Continues a fit from where an undamped step leads, even if the cost is higher there; keeps the result if its cost is lower. What would
+    /// not come down to the cost `aim` is given up.
     ///
     /// The cost as a function of a size and the rest angle of its law is a curved valley, in which steps that lower the cost are short.
     pub(crate) fn fit_on(
         &self,
         point: &LinearizationPoint<N>,
         mut fitted: FittedHypothesis<N>,
+        aim: f64,
     ) -> FittedHypothesis<N> {
         for _ in 0..CONTINUATIONS {
-            let on = self.fit_after_whole_step(point, &fitted);
+            let on = self.fit_after_whole_step(point, &fitted, aim);
             let Some(on) = on.filter(|on| on.cost < fitted.cost - fitted.enough()) else {
                 break;
             };
@@ -215,16 +236,21 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         fitted
     }
 
-    /// A fit that starts after an undamped step; `None` if the model cannot be evaluated there.
+    /// A fit that starts after an undamped step; `None` if the model cannot be evaluated there, or the fit would be given up.
     fn fit_after_whole_step(
         &self,
         point: &LinearizationPoint<N>,
         fitted: &FittedHypothesis<N>,
+        aim: f64,
     ) -> Option<FittedHypothesis<N>> {
         let (coordinates, clusters) = self.equations(point, fitted, &Columns::default()).ok()?;
         let equations = Equations::new(&clusters, &fitted.hypothesis, &coordinates);
+        if equations.is_hopeless(fitted.cost, aim) {
+            return None;
+        }
         let start = equations.step(0.0)?.from(&fitted.hypothesis, &coordinates);
-        self.fit(point, start, fitted.asked.clone()).ok()
+        self.fit_towards(point, (start, fitted.asked.clone()), aim)
+            .ok()
     }
 
     /// Squares of what a fitted hypothesis leaves of each cluster when the others alone decide its numbers, to first order.
@@ -268,10 +294,23 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
     ) -> Result<(FittedHypothesis<N>, LinearizationPoint<'a, N>), GapError> {
+        self.settle_towards((start, asked), f64::INFINITY)
+    }
+
+    /// The same, given up where the cost will not come down to `aim`.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::settle`].
+    pub(crate) fn settle_towards(
+        &self,
+        (start, asked): (Hypothesis<N>, Vec<Candidate>),
+        aim: f64,
+    ) -> Result<(FittedHypothesis<N>, LinearizationPoint<'a, N>), GapError> {
         let mut point = self.linearize(&start)?;
         let mut before = self.state(&point, start, asked)?;
         for _ in 0..AGAIN {
-            let after = self.fit(&point, before.hypothesis.clone(), before.asked.clone())?;
+            let from = (before.hypothesis.clone(), before.asked.clone());
+            let after = self.fit_towards(&point, from, aim)?;
             let gained = before.cost - after.cost;
             if gained < 2.0 * after.enough() {
                 return Ok((after, point));
@@ -348,6 +387,12 @@ impl Equations {
             regularised,
             usable,
         }
+    }
+
+    /// Whether the cost will not come down to `aim`, by what a whole step would gain.
+    fn is_hopeless(&self, cost: f64, aim: f64) -> bool {
+        let gain = || self.step(0.0).map_or(f64::INFINITY, |step| step.gain);
+        cost > aim && cost - HOPE * gain() > aim
     }
 
     /// The step that lowers the cost most within bounds; `None` where the equations are singular.

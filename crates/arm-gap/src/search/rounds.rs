@@ -397,7 +397,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 ..
             } = &choices[i];
             let asked: Vec<Candidate> = members.iter().map(question).collect();
-            let fitted = self.attempt(current, (&asked, coefficients), point)?;
+            let fitted = self.attempt(current, (&asked, coefficients), (point, f64::INFINITY))?;
             Some((asked, fitted))
         });
         converged.met.extend(choices.into_iter().map(|c| c.members));

@@ -271,17 +271,19 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                     0.7 + 0.2 * slot as f64 / fitted.asked.len() as f64,
                 )?;
                 let gain = fitted.asked[slot].gained.min(f64::MAX);
+                // A shape that is refined may explain the error of the law of another one.
+                let bent = self.mimicked_beside((&fitted, slot, less), &[], &point);
+                let most = self.most_worse(&fitted.asked[slot], gain / scale, bent / scale);
                 let alternatives = match &library {
                     // Where the run cannot be followed without it, its gain is unknown.
                     Some(library) if less.cost.is_finite() => {
                         let place = (slot, less, entry.as_ref());
-                        let found = self.alternatives(&fitted, place, (&point, library), scale);
+                        let near = (&point, library);
+                        let found = self.alternatives(&fitted, place, near, (scale, most));
                         found.unwrap_or_default()
                     }
                     _ => Vec::new(),
                 };
-                // A shape that is refined may explain the error of the law of another one.
-                let bent = self.mimicked_beside((&fitted, slot, less), &[], &point);
                 let better = alternatives.iter().find(|r| {
                     let clear = r.alternative.worse < -TIE;
                     exchanges < if clear { CLEAR_EXCHANGES } else { EXCHANGES }
@@ -337,6 +339,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
+    /// How much worse another effect may be and still matter, as an alternative or in the place of one that gained so much; arguments as of
+    /// [`PreparedSession::takes_over`].
+    pub(crate) fn most_worse(&self, own: &Candidate, gain: f64, bent: f64) -> f64 {
+        let shapes = self.price_of_shapes(std::slice::from_ref(own));
+        self.tie(own, gain).max(shapes).max(bent)
+    }
+
     /// Whether another effect takes the place of a named one.
     ///
     /// The better one does, when its gain exceeds the price of the shapes that are refined with it. Without repeats a tie goes to the plainer law, the
@@ -373,12 +382,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// Two criteria select another effect: what it explains once all is refitted without the named one, and how well it replaces
     /// that one where all is as it was fitted. The first fails where the refit is at its bounds, the second where much
     /// else changes with the exchange.
+    ///
+    /// * `most` - how much worse they may be and still matter; the fit of one that will be worse is given up
     pub(crate) fn alternatives(
         &self,
         fitted: &FittedHypothesis<N>,
         (slot, less, entry): (usize, &FittedHypothesis<N>, Option<&LibraryEntry>),
         (point, library): (&LinearizationPoint<N>, &Library),
-        scale: f64,
+        (scale, most): (f64, f64),
     ) -> Result<Vec<ConvergedAlternative<N>>, GapError> {
         let own = &fitted.asked[slot];
         let refitted = ScoreTest::new(self, less, point, library)?;
@@ -423,9 +434,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let mut asked = candidate(choice).clone();
             (asked.price, asked.spread) = (score_test.price[member], score_test.spread[member]);
             let choice = (std::slice::from_ref(&asked), choice.coefficients.as_slice());
-            let mut again = self.attempt(from, choice, point)?;
+            let aim = fitted.cost + (most + own.price - asked.price) * scale;
+            let mut again = self.attempt(from, choice, (point, aim))?;
             if own.is_of_family_in_joint(&asked.effect) {
-                again = self.fit_on(point, again);
+                again = self.fit_on(point, again, aim);
             }
             let effect = again.hypothesis.named.last().copied();
             let effect = effect.filter(|effect| !asked.is_plainer(effect))?;
@@ -456,11 +468,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// A hypothesis with further effects, fitted; `None` where it cannot be followed.
     ///
     /// The first-order coefficients are halved until they lower the cost: effects that are strong are not linear.
+    ///
+    /// * `aim` - as of [`PreparedSession::fit_towards`]
     pub(crate) fn attempt(
         &self,
         current: &FittedHypothesis<N>,
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
-        point: &LinearizationPoint<N>,
+        (point, aim): (&LinearizationPoint<N>, f64),
     ) -> Option<FittedHypothesis<N>> {
         /// Shares of the first-order coefficients that are tried: the response to a strong effect is smaller than to first order.
         const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
@@ -473,7 +487,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 let own: Vec<f64> = own.iter().map(|b| share * b).collect();
                 hypothesis.named.push(candidate.found(&own));
             }
-            if let Ok(fitted) = self.fit(point, hypothesis.handed_over(), all.clone()) {
+            let start = (hypothesis.handed_over(), all.clone());
+            if let Ok(fitted) = self.fit_towards(point, start, aim) {
                 if fitted.cost < current.cost {
                     return Some(fitted);
                 }

@@ -241,8 +241,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             // A shape may explain the error of the law of another one.
             let bent = self.mimicked_beside((current, slot, current), &base, point);
-            if let Ok((fitted, point)) = self.settle(start, asked)
-                && fitted.cost < current.cost + f64::max(price, bent)
+            let most = current.cost + f64::max(price, bent);
+            if let Ok((fitted, point)) = self.settle_towards((start, asked), most)
+                && fitted.cost < most
             {
                 return Ok(Some((fitted, point)));
             }
@@ -320,7 +321,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let mut start = law.nearer.as_ref()?.hypothesis.clone();
             start.named.pop();
             start.known[first + law.base] = fitted.hypothesis.known[first + law.base];
-            let again = self.settle(start, fitted.asked.clone()).ok()?;
+            let from = (start, fitted.asked.clone());
+            let again = self.settle_towards(from, fitted.cost).ok()?;
             (again.0.cost + again.0.enough() < fitted.cost).then_some(again)
         })
     }
@@ -402,7 +404,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             return;
         };
         let place = (slot, &less, entry);
-        let alternatives = self.alternatives(fitted, place, (point, library), scale);
+        let most = self.most_worse(&law.question, law.gain, 0.0);
+        let alternatives = self.alternatives(fitted, place, (point, library), (scale, most));
         let mut alternatives = alternatives.unwrap_or_default();
         let all = alternatives.iter().map(|r| &r.fitted);
         law.nearer = all
