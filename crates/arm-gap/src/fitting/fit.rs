@@ -494,6 +494,14 @@ mod tests {
         assert!(near(&bounded, 1.0, 20.0));
     }
 
+    /// A whole step gains 36; the fit may still gain four times as much.
+    #[test]
+    fn a_fit_is_given_up_where_steps_like_the_next_will_not_lead_to_its_aim() {
+        let equations = equations(4.0, 12.0, (-10.0, 10.0));
+        assert!(equations.is_hopeless(200.0, 55.0) && !equations.is_hopeless(200.0, 57.0));
+        assert!(!equations.is_hopeless(50.0, 55.0) && !equations.is_hopeless(1e9, f64::INFINITY));
+    }
+
     /// A rest angle near zero could move by a hundredth of a radian in a step, and a fit ended before it was reached.
     #[test]
     fn an_angle_of_a_joint_has_no_size_of_its_own() {

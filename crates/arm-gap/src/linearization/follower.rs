@@ -58,6 +58,7 @@ impl<const N: usize> Linear<'_, N> {
         let remembers = any_state(&plant.resisting);
         let count = if remembers { plant.resisting.len() } else { 0 };
         let mut memory = vec![[0.0; MAX_STATES]; count];
+        let mut expected = memory.clone();
         let mut out = Vec::with_capacity(self.states.len());
         let mut follower = Follower::new(self, plant);
         let mut before = self.states[0];
@@ -72,7 +73,7 @@ impl<const N: usize> Linear<'_, N> {
                     advance_states(&plant.resisting, motions, memory, h);
                 };
                 // States of effects follow slowly: where the step is expected to end is near enough.
-                let mut expected = memory.clone();
+                expected.clone_from(&memory);
                 if remembers {
                     carry(&instant.place(&instant.start), &mut expected);
                 }

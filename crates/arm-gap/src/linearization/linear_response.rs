@@ -3,7 +3,9 @@
 //! A change of the rig, an effect or the handle's path leaves a residual torque in the equation of motion of the run. The arm responds as a
 //! linear system with coefficients that follow the run. A hundred candidates cost less than one simulation each.
 
-use arm_core::effect::{Effect, dry_friction, resisting_besides_dry};
+use std::sync::Arc;
+
+use arm_core::effect::{Effect, any_state, dry_friction, resisting_besides_dry};
 use arm_core::{Joints, Plane};
 use arm_sim::SimulationError;
 
@@ -187,8 +189,7 @@ impl<const N: usize> Linear<'_, N> {
             let memories = self.memories(&plant.resisting);
             let own = self.balances_from(origin);
             let one = |i: usize| {
-                let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
-                let changed = balance(plant, &self.states[i], hands[i], memory);
+                let changed = balance(plant, &self.states[i], hands[i], memories.at(i));
                 let friction = (own[i].friction - changed.friction).component_mul(&self.ways[i]);
                 let push = own[i].torque - changed.torque + friction;
                 (push, [0, 1].map(|c| changed.force[c] - own[i].force[c]))
@@ -196,7 +197,12 @@ impl<const N: usize> Linear<'_, N> {
             return steps.map(one).collect();
         }
         // What the same effects resist with takes itself out.
-        let less = self.resisted(&multiset_difference(&before.resisting, &plant.resisting));
+        let other = multiset_difference(&before.resisting, &plant.resisting);
+        // States of effects take long to follow, and every parameter of an effect asks for those of the same one.
+        let less = match any_state(&other) {
+            true => origin.resisted.of(&other, || self.resisted(&other)),
+            false => Arc::new(self.resisted(&other)),
+        };
         let more = self.resisted(&multiset_difference(&plant.resisting, &before.resisting));
         let push = |i: usize| less[i] - more[i];
         if same_rig {
@@ -229,8 +235,7 @@ impl<const N: usize> Linear<'_, N> {
         }
         let memories = self.memories(effects);
         let one = |i: usize| {
-            let motion = &self.balances[i].motion;
-            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
+            let (motion, memory) = (&self.balances[i].motion, memories.at(i));
             let friction = Joints::from(dry_friction(effects, motion, memory));
             resisting_besides_dry(effects, motion, memory) + friction.component_mul(&self.ways[i])
         };

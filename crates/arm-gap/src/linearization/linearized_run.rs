@@ -78,6 +78,21 @@ pub struct Linear<'a, const N: usize> {
     pub(super) rest: SMatrix<f64, N, N>,
 }
 
+/// States of effects at every step of a run; nothing where no effect has one.
+#[derive(Default)]
+pub(super) struct Memories {
+    effects: usize,
+    /// Those of all effects at one step after those of the step before.
+    states: Vec<States<f64>>,
+}
+
+impl Memories {
+    /// Those of all effects at a step.
+    pub fn at(&self, step: usize) -> &[States<f64>] {
+        &self.states[step * self.effects..(step + 1) * self.effects]
+    }
+}
+
 impl<'a, const N: usize> Linear<'a, N> {
     /// Linearises along the run of a hypothesis.
     ///
@@ -132,7 +147,7 @@ impl<'a, const N: usize> Linear<'a, N> {
         linear.balances = linear.balances_of(&linear.own.plant, &memories);
         linear.own.plant.feels_force = feels_force;
         for i in 0..linear.states.len() {
-            linear.differentiate(i, memories.get(i).map_or(&[], Vec::as_slice));
+            linear.differentiate(i, memories.at(i));
         }
         let held = linear.own.held_at_start(&linear.balances[0].motion);
         linear.rest = linear.slopes.first().map_or_else(SMatrix::zeros, |slopes| {
@@ -158,35 +173,32 @@ impl<'a, const N: usize> Linear<'a, N> {
     }
 
     /// The states of effects that have one, along the run; nothing where none has.
-    pub(super) fn memories(&self, effects: &[Effect<f64>]) -> Vec<Vec<States<f64>>> {
+    pub(super) fn memories(&self, effects: &[Effect<f64>]) -> Memories {
         if !any_state(effects) {
-            return Vec::new();
+            return Memories::default();
         }
         let mut now = vec![[0.0; MAX_STATES]; effects.len()];
-        let motion = |state: &State<N>| state.motion();
-        let mut out = Vec::with_capacity(self.states.len());
-        for (i, state) in self.states.iter().enumerate() {
-            if i > 0 {
-                let before = motion(&self.states[i - 1]);
-                advance_states(effects, (&before, &motion(state)), &mut now, self.step);
+        let mut states = Vec::with_capacity(effects.len() * self.states.len());
+        let mut before = self.states[0].motion();
+        for state in &self.states {
+            let motion = state.motion();
+            if !states.is_empty() {
+                advance_states(effects, (&before, &motion), &mut now, self.step);
             }
-            out.push(now.clone());
+            states.extend_from_slice(&now);
+            before = motion;
         }
-        out
+        Memories {
+            effects: effects.len(),
+            states,
+        }
     }
 
     /// The balance of another plant for the motion of the run at every step, led as the run is.
     ///
     /// * `memories` - the states of its effects along the run
-    pub(super) fn balances_of(
-        &self,
-        plant: &Plant<N>,
-        memories: &[Vec<States<f64>>],
-    ) -> Vec<Balance<N>> {
-        let one = |i: usize| {
-            let memory = memories.get(i).map_or(&[][..], Vec::as_slice);
-            balance(plant, &self.states[i], self.hands[i], memory)
-        };
+    pub(super) fn balances_of(&self, plant: &Plant<N>, memories: &Memories) -> Vec<Balance<N>> {
+        let one = |i: usize| balance(plant, &self.states[i], self.hands[i], memories.at(i));
         (0..self.states.len()).map(one).collect()
     }
 

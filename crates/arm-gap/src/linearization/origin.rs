@@ -1,8 +1,8 @@
 //! The hypothesis that small changes are measured from.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use arm_core::effect::Motion;
+use arm_core::effect::{Effect, Motion};
 use arm_core::{Joints, Plane};
 
 use crate::data::course::Channels;
@@ -22,6 +22,37 @@ pub struct Origin<const N: usize> {
     pub(super) delayed_force: OnceLock<Vec<Plane<f64>>>,
     /// Its balance for the motion of the run, where it was needed.
     pub(super) balances: OnceLock<Vec<Balance<N>>>,
+    /// What its effects resist with along the run.
+    pub(super) resisted: Resisted<N>,
+}
+
+/// What effects resist with at every step of a run \[N m\], computed once.
+#[derive(Default)]
+pub(super) struct Resisted<const N: usize>(Mutex<Vec<Known<N>>>);
+
+/// Effects, and what they resist with together.
+type Known<const N: usize> = (Vec<Effect<f64>>, Arc<Vec<Joints<f64, N>>>);
+
+impl<const N: usize> Resisted<N> {
+    /// What some effects resist with.
+    ///
+    /// * `compute` - called where it is not known yet
+    pub fn of(
+        &self,
+        effects: &[Effect<f64>],
+        compute: impl FnOnce() -> Vec<Joints<f64, N>>,
+    ) -> Arc<Vec<Joints<f64, N>>> {
+        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known()
+            .iter()
+            .find(|(e, _)| e == effects)
+            .map(|k| Arc::clone(&k.1));
+        found.unwrap_or_else(|| {
+            let fresh = Arc::new(compute());
+            known().push((effects.to_vec(), Arc::clone(&fresh)));
+            fresh
+        })
+    }
 }
 
 impl<const N: usize> Origin<N> {
@@ -33,11 +64,32 @@ impl<const N: usize> Origin<N> {
             shown: Channels::new(),
             delayed_force: OnceLock::new(),
             balances: OnceLock::new(),
+            resisted: Resisted::default(),
         }
     }
 
     /// The joints that dry friction holds where the run starts.
     pub(super) fn held_at_start(&self, motion: &Motion<f64, N>) -> [bool; N] {
         held_at_start(&self.resting.friction(motion, &[]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::Kind;
+
+    use super::*;
+
+    #[test]
+    fn what_effects_resist_with_is_computed_once() {
+        let resisted = Resisted::<1>::default();
+        let of = |joint, torque| {
+            let effect = [Effect::new(Kind::Viscous, joint)];
+            resisted.of(&effect, || vec![Joints::repeat(torque)])[0][0]
+        };
+        assert_eq!(
+            [of(0, 1.0), of(1, 2.0), of(0, 3.0), of(1, 4.0)],
+            [1.0, 2.0, 1.0, 2.0]
+        );
     }
 }
