@@ -159,7 +159,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.fit_towards(point, (start, asked), f64::INFINITY)
     }
 
-    /// The same, given up where the cost will not come down to `aim`.
+    /// The same, given up where the cost will not come down to `aim`: the result is unfinished then, and its cost is above `aim`.
     ///
     /// # Errors
     /// As [`PreparedSession::fit`].
@@ -185,6 +185,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 self.equations_with(point, &fitted, (&each, &Columns::default()));
             let equations = Equations::new(&clusters, hypothesis, &coordinates);
             if equations.is_hopeless(fitted.cost, aim) {
+                if old {
+                    continue;
+                }
                 break;
             }
             let next = |step: &Step| {
@@ -294,23 +297,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
     ) -> Result<(FittedHypothesis<N>, LinearizationPoint<'a, N>), GapError> {
-        self.settle_towards((start, asked), f64::INFINITY)
-    }
-
-    /// The same, given up where the cost will not come down to `aim`.
-    ///
-    /// # Errors
-    /// As [`PreparedSession::settle`].
-    pub(crate) fn settle_towards(
-        &self,
-        (start, asked): (Hypothesis<N>, Vec<Candidate>),
-        aim: f64,
-    ) -> Result<(FittedHypothesis<N>, LinearizationPoint<'a, N>), GapError> {
         let mut point = self.linearize(&start)?;
         let mut before = self.state(&point, start, asked)?;
         for _ in 0..AGAIN {
-            let from = (before.hypothesis.clone(), before.asked.clone());
-            let after = self.fit_towards(&point, from, aim)?;
+            let after = self.fit(&point, before.hypothesis.clone(), before.asked.clone())?;
             let gained = before.cost - after.cost;
             if gained < 2.0 * after.enough() {
                 return Ok((after, point));

@@ -3,8 +3,6 @@
 //! A change of the rig, an effect or the handle's path leaves a residual torque in the equation of motion of the run. The arm responds as a
 //! linear system with coefficients that follow the run. A hundred candidates cost less than one simulation each.
 
-use std::sync::Arc;
-
 use arm_core::effect::{Effect, any_state, dry_friction, resisting_besides_dry};
 use arm_core::{Joints, Plane};
 use arm_sim::SimulationError;
@@ -198,10 +196,14 @@ impl<const N: usize> Linear<'_, N> {
         }
         // What the same effects resist with takes itself out.
         let other = multiset_difference(&before.resisting, &plant.resisting);
-        // States of effects take long to follow, and every parameter of an effect asks for those of the same one.
-        let less = match any_state(&other) {
-            true => origin.resisted.of(&other, || self.resisted(&other)),
-            false => Arc::new(self.resisted(&other)),
+        // Computing states is slow, and all parameters of an effect need the same ones.
+        let (known, fresh);
+        let less = if any_state(&other) {
+            known = origin.resisted.of(&other);
+            known.get_or_init(|| self.resisted(&other))
+        } else {
+            fresh = self.resisted(&other);
+            &fresh
         };
         let more = self.resisted(&multiset_difference(&plant.resisting, &before.resisting));
         let push = |i: usize| less[i] - more[i];

@@ -31,27 +31,18 @@ pub struct Origin<const N: usize> {
 pub(super) struct Resisted<const N: usize>(Mutex<Vec<Known<N>>>);
 
 /// Effects, and what they resist with together.
-type Known<const N: usize> = (Vec<Effect<f64>>, Arc<Vec<Joints<f64, N>>>);
+type Known<const N: usize> = (Vec<Effect<f64>>, Arc<OnceLock<Vec<Joints<f64, N>>>>);
 
 impl<const N: usize> Resisted<N> {
-    /// What some effects resist with.
-    ///
-    /// * `compute` - called where it is not known yet
-    pub fn of(
-        &self,
-        effects: &[Effect<f64>],
-        compute: impl FnOnce() -> Vec<Joints<f64, N>>,
-    ) -> Arc<Vec<Joints<f64, N>>> {
-        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = known()
-            .iter()
-            .find(|(e, _)| e == effects)
-            .map(|k| Arc::clone(&k.1));
-        found.unwrap_or_else(|| {
-            let fresh = Arc::new(compute());
-            known().push((effects.to_vec(), Arc::clone(&fresh)));
-            fresh
-        })
+    /// What some effects resist with, where it is known already.
+    pub fn of(&self, effects: &[Effect<f64>]) -> Arc<OnceLock<Vec<Joints<f64, N>>>> {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, own)) = known.iter().find(|(e, _)| e == effects) {
+            return Arc::clone(own);
+        }
+        let fresh = Arc::default();
+        known.push((effects.to_vec(), Arc::clone(&fresh)));
+        fresh
     }
 }
 
@@ -84,8 +75,8 @@ mod tests {
     fn what_effects_resist_with_is_computed_once() {
         let resisted = Resisted::<1>::default();
         let of = |joint, torque| {
-            let effect = [Effect::new(Kind::Viscous, joint)];
-            resisted.of(&effect, || vec![Joints::repeat(torque)])[0][0]
+            let known = resisted.of(&[Effect::new(Kind::Viscous, joint)]);
+            known.get_or_init(|| vec![Joints::repeat(torque)])[0][0]
         };
         assert_eq!(
             [of(0, 1.0), of(1, 2.0), of(0, 3.0), of(1, 4.0)],

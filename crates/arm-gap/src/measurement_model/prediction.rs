@@ -8,8 +8,7 @@ use crate::data::course::{Channels, Course, smooth};
 use crate::data::session::{ComparisonMode, Session};
 use crate::hypothesis::{Hypothesis, Target};
 
-/// Steps that are tried, longest first \[s\]. Where dry friction allows no longest one, the step that it allows takes the place of those that
-/// are longer; the last one is taken even where friction would like it shorter.
+/// Steps that are tried, longest first \[s\]; the last one is taken even where dry friction would like it shorter.
 pub(crate) const STEPS: [f64; 4] = [2e-3, 1e-3, 5e-4, 2.5e-4];
 /// Least rate at which a run is recorded that sensors read \[Hz\]: what a delayed sensor reads lies between samples, where few of them
 /// would take a fifth of an arm's ringing on its contact.
@@ -73,9 +72,10 @@ impl<const N: usize> Session<N> {
         let near = self.near(hypothesis, course)?;
         let limit = friction_limit(&experiment, &near);
         let mut last = None;
-        let longest = limit.clamp(STEPS[STEPS.len() - 1], STEPS[0]);
-        let shorter = STEPS.into_iter().filter(|&step| step < longest);
-        for step in std::iter::once(longest).chain(shorter) {
+        for (i, step) in STEPS.into_iter().enumerate() {
+            if step > limit && i + 1 < STEPS.len() {
+                continue;
+            }
             experiment.dt = interval / libm::ceil(interval / step - 1e-9);
             let start = self.start(hypothesis, course, &experiment);
             let mut outcome = start.and_then(|start| {

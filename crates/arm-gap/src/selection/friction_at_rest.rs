@@ -126,7 +126,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         let question = sticking.asked[slot].clone().at_rest_as(named);
         sticking.asked[slot] = question;
-        match self.settle_towards((sticking.hypothesis, sticking.asked), fitted.cost) {
+        match self.settle(sticking.hypothesis, sticking.asked) {
             Ok((refitted, _)) if is_cheaper(&refitted, &fitted) => refitted,
             _ => fitted,
         }

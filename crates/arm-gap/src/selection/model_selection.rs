@@ -434,8 +434,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let mut asked = candidate(choice).clone();
             (asked.price, asked.spread) = (score_test.price[member], score_test.spread[member]);
             let choice = (std::slice::from_ref(&asked), choice.coefficients.as_slice());
-            // A tie to spare, for fits that are slow at the end.
-            let aim = fitted.cost + (most + TIE + own.price - asked.price) * scale;
+            // A tie to spare, for fits that are slow at the end. What is clearly nearer to the data matters at any price.
+            let aim = f64::max(most + TIE + own.price - asked.price, -TIE);
+            let aim = fitted.cost + aim * scale;
             let mut again = self.attempt(from, choice, (point, aim))?;
             if own.is_of_family_in_joint(&asked.effect) {
                 again = self.fit_on(point, again, aim);

@@ -241,9 +241,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             };
             // A shape may explain the error of the law of another one.
             let bent = self.mimicked_beside((current, slot, current), &base, point);
-            let most = current.cost + f64::max(price, bent);
-            if let Ok((fitted, point)) = self.settle_towards((start, asked), most)
-                && fitted.cost < most
+            if let Ok((fitted, point)) = self.settle(start, asked)
+                && fitted.cost < current.cost + f64::max(price, bent)
             {
                 return Ok(Some((fitted, point)));
             }
@@ -321,8 +320,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let mut start = law.nearer.as_ref()?.hypothesis.clone();
             start.named.pop();
             start.known[first + law.base] = fitted.hypothesis.known[first + law.base];
-            let from = (start, fitted.asked.clone());
-            let again = self.settle_towards(from, fitted.cost).ok()?;
+            let again = self.settle(start, fitted.asked.clone()).ok()?;
             (again.0.cost + again.0.enough() < fitted.cost).then_some(again)
         })
     }
