@@ -184,12 +184,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let (coordinates, clusters) =
                 self.equations_with(point, &fitted, (&each, &Columns::default()));
             let equations = Equations::new(&clusters, hypothesis, &coordinates);
-            if equations.is_hopeless(fitted.cost, aim) {
-                if old {
-                    continue;
-                }
-                break;
-            }
+            let hopeless = equations.is_hopeless(fitted.cost, aim);
             let next = |step: &Step| {
                 let moved = step.from(hypothesis, &coordinates);
                 let next = self.state(point, moved, fitted.asked.clone()).ok()?;
@@ -199,7 +194,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             // little to first order need not be tried, nor any that is damped more.
             let found = (lightest.saturating_sub(1)..DAMPING.len())
                 .filter_map(|d| Some((d, equations.step(DAMPING[d])?)))
-                .take_while(|(_, step)| step.gain > FIRST_ORDER_SHARE * fitted.enough())
+                .take_while(|(_, step)| {
+                    !hopeless && step.gain > FIRST_ORDER_SHARE * fitted.enough()
+                })
                 .find_map(|(d, step)| Some((d, next(&step)?)));
             let Some((damping, next)) = found else {
                 if old {
