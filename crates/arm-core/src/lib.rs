@@ -52,6 +52,7 @@ pub use dynamics::inverse_and_forward::{
 pub use dynamics::kinematics::{Pose, jacobian, jacobian_rate, joint_position, tip, tip_velocity};
 pub use dynamics::products::Products;
 pub use dynamics::regressor::{Regressor, regressor};
+pub use dynamics::torque_by_angle::torque_by_angle;
 pub use error::{Invalid, Shown};
 pub use numeric::float::write_sines_and_cosines;
 pub use numeric::lanes::Lanes;

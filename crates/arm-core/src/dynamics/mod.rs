@@ -9,3 +9,4 @@ pub(crate) mod inverse_and_forward;
 pub(crate) mod kinematics;
 pub(crate) mod products;
 pub(crate) mod regressor;
+pub(crate) mod torque_by_angle;

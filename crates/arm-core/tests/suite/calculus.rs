@@ -3,8 +3,8 @@
 use arm_core::effect::{Effect, KINDS, Local, Place};
 use arm_core::{
     Chain, Elbow, Joints, Limits, Load, Pose, Profile, Robot, Scalar, Shape, coriolis,
-    coriolis_matrix, forward_dynamics, gravity, inertia, jacobian, jacobian_rate, kinetic_energy,
-    potential_energy, static_torque, tip, tip_velocity,
+    coriolis_matrix, forward_dynamics, gravity, inertia, inverse_dynamics, jacobian, jacobian_rate,
+    kinetic_energy, potential_energy, static_torque, tip, tip_velocity, torque_by_angle,
 };
 
 use crate::common::Random;
@@ -94,6 +94,26 @@ fn lagrange<const N: usize>(seed: u64) {
     }
 }
 
+/// What the joints give for a motion under a force at the tip follows every angle.
+fn torque_slopes<const N: usize>(seed: u64) {
+    for (s, mut random) in states::<N>(seed) {
+        let qdd = random.joints(20.0);
+        let force = [random.uniform(-50.0, 50.0), random.uniform(-50.0, 50.0)];
+        let slopes = torque_by_angle(&s.arm, &s.pose, (&s.qd, &qdd), force);
+        let [qd, qdd] = [&s.qd, &qdd].map(|rates| along(rates, &Joints::zeros()));
+        for i in 0..N {
+            let moved = Pose::new(&along(&s.q, &unit(i)));
+            let torque = inverse_dynamics(&s.dual, &moved, &qd, &qdd)
+                - static_torque(&s.dual, &moved, force.map(Dual::of), Dual::ZERO);
+            // Terms of order a hundred may cancel.
+            let scale = 1.0 + slopes.amax();
+            for j in 0..N {
+                assert!((slopes[(j, i)] - torque[j].slope).abs() < ROUNDING * scale);
+            }
+        }
+    }
+}
+
 /// The rate of energy is the power of what acts.
 fn power<const N: usize>(seed: u64) {
     for (s, mut random) in states::<N>(seed) {
@@ -136,6 +156,7 @@ for_joints! {
     gravity_and_jacobians_are_derivatives: statics_and_kinematics 61
     coriolis_follows_from_inertia: lagrange 62
     energy_changes_by_the_power_supplied: power 63
+    torques_follow_the_angles: torque_slopes 64
 }
 
 #[test]

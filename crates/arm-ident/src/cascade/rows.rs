@@ -2,7 +2,7 @@
 
 use super::unknowns::{is_dissipative, is_found};
 use crate::error::IdentError;
-use crate::regression::calibration::{Nearby, PredictedForce, influence as of_calibration};
+use crate::regression::calibration::{Influence, PredictedForce};
 use crate::regression::equation::gradient;
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
@@ -122,7 +122,10 @@ impl<'a, const N: usize> Building<'a, N> {
         self.memory.advance(&at, 1.0 / trial.rate);
         let memory = &self.memory;
         let predicted = self.prediction.as_mut();
-        let predicted = predicted.map_or_else(Nearby::default, |p| p.next(kept, trial, still));
+        let predicted = predicted.map(|p| p.next(kept, trial, still));
+        let along =
+            |motion| predicted.map(|force| Influence::at((kept, trial, motion), memory, force, i));
+        let mut influence = along(still);
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let mut measured = static_torque(&model.chain, &pose, force, moment)
             - resisting_torque(&kept.held, &at, &memory.held);
@@ -142,11 +145,12 @@ impl<'a, const N: usize> Building<'a, N> {
                 Source::Effect(e, p) | Source::RestTorque(e, p) => {
                     gradient(&model.fitted[e], p, &at, [0.0; MAX_STATES])
                 }
-                Source::Calibration(what @ Imperfection::NeglectedInertia) => {
-                    of_calibration(kept, trial, &self.moving, (&predicted, memory, i), what)
-                }
                 Source::Calibration(what) => {
-                    of_calibration(kept, trial, still, (&predicted, memory, i), what)
+                    let moving =
+                        (what == Imperfection::NeglectedInertia).then(|| along(&self.moving));
+                    let mut at = moving.flatten();
+                    let at = at.as_mut().or(influence.as_mut());
+                    at.map_or_else(Joints::zeros, |at| at.of(what))
                 }
             };
             column[here.clone()].copy_from_slice(value.as_slice());

@@ -5,7 +5,7 @@ use arm_sim::Springs;
 use crate::error::IdentError;
 use crate::inference::updated_model::{updated, values};
 use crate::inference::weighted_fit::{Solved, weighted};
-use crate::regression::equation::Building;
+use crate::regression::equation::{Building, follows_estimate};
 use crate::regression::instrument::Instrument;
 use crate::regression::measured_motion::{measured, widened};
 use crate::regression::preprocessing::{
@@ -91,12 +91,17 @@ impl<const N: usize> Task<'_, N> {
         let (mut shown, mut refused, mut settled) = (at.clone(), None, false);
         let (mut share, mut before) = (1.0, f64::INFINITY);
         for _ in 0..most {
-            // Rows take most of the memory: those of the last round make room first.
-            prepared.clear();
+            if simulate {
+                // Rows take most of the memory: those of the last round make room first.
+                prepared.clear();
+            }
+            let again = !prepared.is_empty();
+            let follows = |u| !again || follows_estimate(&at.model, u);
+            let wanted: Vec<bool> = unknowns.iter().map(follows).collect();
             let delay = delay(unknowns, &at.x);
             let how = (cutoff, simulate, delay, assistance);
-            prepared = match prepare((&at.model, unknowns), trials, how, threads) {
-                Ok(prepared) => prepared,
+            match prepare((&at.model, unknowns, &wanted), trials, how, threads) {
+                Ok(fresh) => renew(&mut prepared, fresh, &wanted),
                 // A step too far makes an arm that cannot be simulated: half of it is a step too.
                 Err(error) if last.is_some() => {
                     at = shown.towards(&at.x, 0.5, unknowns)?;
@@ -234,9 +239,28 @@ fn share_of_step(last: f64, moved: f64, before: f64) -> f64 {
     }
 }
 
-/// Filtered rows of every trial.
+/// Puts fresh columns of the wanted unknowns, and right-hand sides, in the place of those in the rows of every trial, if there are any.
+fn renew(prepared: &mut Vec<Pieces>, fresh: Vec<Pieces>, wanted: &[bool]) {
+    if prepared.is_empty() {
+        *prepared = fresh;
+        return;
+    }
+    let pairs = prepared
+        .iter_mut()
+        .flatten()
+        .zip(fresh.into_iter().flatten());
+    for (rows, fresh) in pairs {
+        let own = rows.columns.iter_mut().zip(wanted);
+        let own = own.filter(|(_, wanted)| **wanted);
+        own.zip(fresh.columns)
+            .for_each(|((own, _), new)| *own = new);
+        (rows.rhs, rows.held) = (fresh.rhs, fresh.held);
+    }
+}
+
+/// Filtered rows of every trial. Along measured motion they have columns of the wanted unknowns only.
 fn prepare<const N: usize>(
-    (model, unknowns): (&Model<N>, &[Unknown]),
+    (model, unknowns, wanted): (&Model<N>, &[Unknown], &[bool]),
     trials: &[Trial<N>],
     (cutoff, simulate, delay, assistance): (f64, bool, f64, Option<Springs<N>>),
     threads: usize,
@@ -251,9 +275,9 @@ fn prepare<const N: usize>(
         // A test trial that cannot be simulated is explained from what was measured; it decides nothing.
         if !simulate || (trial.role == Role::Test && !can_simulate(trial)) {
             let motion = measured(trial, cutoff)?;
-            let mut rows = Building::new((&model, unknowns), trial, &motion);
+            let mut rows = Building::new((&model, unknowns), trial, &motion).of_only(wanted);
             let pieces = filtered(trial, cutoff, rows.width(), |count| rows.next(count))?;
-            return Ok(with_rest_columns(pieces, unknowns.len()));
+            return Ok(with_rest_columns(pieces, rows.columns()));
         }
         let course =
             simulated(&model, trial, cutoff, assistance).map_err(|error| error.in_trial(k))?;

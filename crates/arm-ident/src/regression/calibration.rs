@@ -4,8 +4,11 @@
 //! force that the *model* predicts, never from the measured one: a column that carries the noise of the right-hand side
 //! would explain that noise, and gain and parameters would be biased towards zero.
 
-use arm_core::effect::resisting_torque;
-use arm_core::{Joints, Plane, Pose, Scalar, gravity, inverse_dynamics, jacobian, static_torque};
+use arm_core::effect::{Effect, Motion, States, resisting_torque};
+use arm_core::{
+    JointMatrix, Joints, Plane, Pose, Scalar, gravity, inverse_dynamics, jacobian, static_torque,
+    torque_by_angle,
+};
 
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
@@ -103,67 +106,123 @@ impl<const N: usize> PredictedForce<N> {
     }
 }
 
-/// What one unit of an imperfection adds to the left-hand side of a sample's rows \[N m\].
-pub(crate) fn influence<const N: usize>(
-    model: &Model<N>,
-    trial: &Trial<N>,
-    motion: &Kinematics<N>,
-    (force, memory, i): (&Nearby, &InternalStates<N>, usize),
-    what: Imperfection,
-) -> Joints<f64, N> {
-    let pose = Pose::new(&motion.q[i]);
-    match what {
-        Imperfection::AngleOffset(joint) => {
-            angle_offset(model, (trial, motion, i), (force.here, memory), joint)
+/// What one unit of an imperfection adds to the left-hand side of the rows of one sample \[N m\].
+pub(crate) struct Influence<'a, const N: usize> {
+    pub model: &'a Model<N>,
+    pub trial: &'a Trial<N>,
+    pub motion: &'a Kinematics<N>,
+    pub memory: &'a InternalStates<N>,
+    /// The predicted force on the arm.
+    pub force: Nearby,
+    pub sample: usize,
+    pub pose: Pose<f64, N>,
+    /// Slopes of the left-hand side to the angles, once an offset asks for them.
+    slopes: Option<JointMatrix<f64, N>>,
+}
+
+impl<'a, const N: usize> Influence<'a, N> {
+    /// At a sample, with the predicted force on the arm there.
+    pub fn at(
+        (model, trial, motion): (&'a Model<N>, &'a Trial<N>, &'a Kinematics<N>),
+        memory: &'a InternalStates<N>,
+        force: Nearby,
+        sample: usize,
+    ) -> Self {
+        Self {
+            model,
+            trial,
+            motion,
+            memory,
+            force,
+            sample,
+            pose: Pose::new(&motion.q[sample]),
+            slopes: None,
         }
-        Imperfection::ForceBias(channel) => {
-            let mut unit = [0.0; 2];
-            unit[channel] = 1.0;
-            static_torque(&model.chain, &pose, unit, 0.0)
+    }
+
+    /// The influence of one imperfection.
+    pub fn of(&mut self, what: Imperfection) -> Joints<f64, N> {
+        let (chain, pose) = (&self.model.chain, self.pose);
+        let (force, i) = (self.force, self.sample);
+        let motion = self.motion;
+        match what {
+            // The measured angle is the true one plus the offset: the row moves against the offset, and springs of the joints with it.
+            Imperfection::AngleOffset(joint) => {
+                let slopes = self.slopes.take().unwrap_or_else(|| self.by_angle());
+                self.slopes = Some(slopes);
+                -slopes.column(joint)
+            }
+            Imperfection::ForceBias(channel) => {
+                let mut unit = [0.0; 2];
+                unit[channel] = 1.0;
+                static_torque(chain, &pose, unit, 0.0)
+            }
+            Imperfection::ForceGain(channel) => {
+                let mut share = [0.0; 2];
+                share[channel] = force.here[channel];
+                static_torque(chain, &pose, share, 0.0)
+            }
+            Imperfection::TimeDelay => {
+                let span = force.span as f64 / self.trial.rate;
+                let rate = [0, 1].map(|c| (force.after[c] - force.before[c]) / span);
+                -static_torque(chain, &pose, rate, 0.0)
+            }
+            Imperfection::NeglectedInertia => {
+                inverse_dynamics(chain, &pose, &motion.qd[i], &motion.qdd[i])
+                    - gravity(chain, &pose)
+            }
+            Imperfection::HandlePlacement(axis) => {
+                // A displaced handle lengthens the lever of the last segment; the moment acts alike on every joint.
+                let angle = motion.q[i].iter().fold(0.0, |sum, q| sum + q);
+                let (s, c) = Scalar::sin_cos(angle);
+                let direction = if axis == 0 { [c, s] } else { [-s, c] };
+                let moment = direction[0] * force.here[1] - direction[1] * force.here[0];
+                Joints::repeat(-moment)
+            }
         }
-        Imperfection::ForceGain(channel) => {
-            let mut share = [0.0; 2];
-            share[channel] = force.here[channel];
-            static_torque(&model.chain, &pose, share, 0.0)
-        }
-        Imperfection::TimeDelay => {
-            let span = force.span as f64 / trial.rate;
-            let rate = [0, 1].map(|c| (force.after[c] - force.before[c]) / span);
-            -static_torque(&model.chain, &pose, rate, 0.0)
-        }
-        Imperfection::NeglectedInertia => {
-            inverse_dynamics(&model.chain, &pose, &motion.qd[i], &motion.qdd[i])
-                - gravity(&model.chain, &pose)
-        }
-        Imperfection::HandlePlacement(axis) => {
-            // A displaced handle lengthens the lever of the last segment; the moment acts alike on every joint.
-            let angle = motion.q[i].iter().fold(0.0, |sum, q| sum + q);
-            let (s, c) = Scalar::sin_cos(angle);
-            let direction = if axis == 0 { [c, s] } else { [-s, c] };
-            let moment = direction[0] * force.here[1] - direction[1] * force.here[0];
-            Joints::repeat(-moment)
-        }
+    }
+
+    /// Slopes of the left-hand side to the angles, a column for each joint \[N m/rad\].
+    fn by_angle(&self) -> JointMatrix<f64, N> {
+        let (i, motion) = (self.sample, self.motion);
+        let (q, qd, qdd) = (&motion.q[i], &motion.qd[i], &motion.qdd[i]);
+        let chain = motion.chain_in_moving_frame(&self.model.chain, i);
+        let seen = self.trial.motion(i, q, qd);
+        let of = |effects, memory| resistance_by_angle(effects, &seen, memory);
+        torque_by_angle(&chain, &self.pose, (qd, qdd), self.force.here)
+            + of(&self.model.fitted, &self.memory.fitted)
+            + of(&self.model.held, &self.memory.held)
     }
 }
 
-/// The measured angle is the true one plus the offset: the row moves against the offset, and springs of the joints with it.
-fn angle_offset<const N: usize>(
-    model: &Model<N>,
-    (trial, motion, i): (&Trial<N>, &Kinematics<N>, usize),
-    (force, memory): (Plane<f64>, &InternalStates<N>),
-    joint: usize,
-) -> Joints<f64, N> {
+/// Slopes of what effects resist with to the angles, a column for each joint \[N m/rad\].
+fn resistance_by_angle<const N: usize>(
+    effects: &[Effect<f64>],
+    motion: &Motion<f64, N>,
+    memory: &[States<f64>],
+) -> JointMatrix<f64, N> {
     /// Half of the step of the central difference \[rad\]: its square is the error of truncation, rounding over it about 1e-11.
     const STEP: f64 = 1e-5;
-    let chain = motion.chain_in_moving_frame(&model.chain, i);
-    let row = |shift: f64| {
-        let mut q = motion.q[i];
-        q[joint] += shift;
-        let (pose, moving) = (Pose::new(&q), trial.motion(i, &q, &motion.qd[i]));
-        inverse_dynamics(&chain, &pose, &motion.qd[i], &motion.qdd[i])
-            + resisting_torque(&model.fitted, &moving, &memory.fitted)
-            + resisting_torque(&model.held, &moving, &memory.held)
-            - static_torque(&chain, &pose, force, 0.0)
-    };
-    (row(-STEP) - row(STEP)) / (2.0 * STEP)
+    let mut slopes = JointMatrix::<f64, N>::zeros();
+    for (k, effect) in effects.iter().enumerate() {
+        let own = effect.index;
+        if own >= N || effect.kind.is_rate_independent() {
+            continue;
+        }
+        if let Some([_, to_angle, _]) = effect.affine() {
+            slopes[(own, own)] += to_angle;
+            continue;
+        }
+        // An effect sees the angle of its own joint and of the one before.
+        for joint in own.saturating_sub(1)..=own {
+            let [up, down] = [STEP, -STEP].map(|step| {
+                let mut moved = *motion;
+                moved.q[joint] += step;
+                resisting_torque(&effects[k..=k], &moved, &memory[k..=k])
+            });
+            let mut column = slopes.column_mut(joint);
+            column += (up - down) / (2.0 * STEP);
+        }
+    }
+    slopes
 }

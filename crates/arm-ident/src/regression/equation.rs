@@ -6,7 +6,7 @@
 //! Where a joint rests, set-valued dry friction resists with whatever holds it: nothing follows from its row, which is zero there. The equation
 //! of every other row is exact, and a low-pass of both sides leaves it so.
 
-use crate::regression::calibration::{Nearby, PredictedForce, influence};
+use crate::regression::calibration::{Influence, PredictedForce};
 use crate::regression::internal_state::InternalStates;
 use crate::regression::kinematics::Kinematics;
 use crate::regression::rows::RegressionRows;
@@ -21,9 +21,15 @@ use arm_core::{Chain, Joints, Pose, inverse_dynamics, joint_force, regressor, st
 pub(crate) struct Building<'a, const N: usize> {
     pub(crate) model: &'a Model<N>,
     pub(crate) unknowns: &'a [Unknown],
+    /// Which of the unknowns get a column.
+    wanted: Vec<bool>,
+    /// Whether moments of segments are among them.
+    wants_segments: bool,
     pub(crate) trial: &'a Trial<N>,
     pub(crate) motion: &'a Kinematics<N>,
     pub(crate) memory: InternalStates<N>,
+    /// Whether the rigid arm has parts that are no unknowns: rotors, or moments of segments that are held.
+    has_held_part: bool,
     /// The fitted effects, springs with an unknown rest angle at rest zero.
     pub(crate) regressed: Vec<Effect<f64>>,
     /// Where imperfections of the measurement are among the unknowns.
@@ -44,9 +50,12 @@ impl<'a, const N: usize> Building<'a, N> {
         Self {
             model,
             unknowns,
+            wanted: vec![true; unknowns.len()],
+            wants_segments: true,
             trial,
             motion,
             memory: InternalStates::new(model),
+            has_held_part: has_held_part(&model.chain, unknowns),
             regressed: regressed(model, unknowns),
             prediction: PredictedForce::of_unknowns(unknowns, model),
             dry: sticking(model),
@@ -54,9 +63,23 @@ impl<'a, const N: usize> Building<'a, N> {
         }
     }
 
-    /// Columns of the rows: one for each unknown and, where some joint sticks, one of [`RegressionRows::held`].
+    /// With columns of these unknowns only.
+    pub fn of_only(mut self, wanted: &[bool]) -> Self {
+        let is_segment = |u: &Unknown| matches!(u.source, Source::Segment(..));
+        let mut all = self.unknowns.iter().zip(wanted);
+        self.wants_segments = all.any(|(u, &wanted)| wanted && is_segment(u));
+        self.wanted = wanted.to_vec();
+        self
+    }
+
+    /// Columns of unknowns.
+    pub fn columns(&self) -> usize {
+        self.wanted.iter().filter(|&&wanted| wanted).count()
+    }
+
+    /// Columns of the rows: those of unknowns and, where some joint sticks, one of [`RegressionRows::held`].
     pub fn width(&self) -> usize {
-        self.unknowns.len() + usize::from(self.dry.contains(&true))
+        self.columns() + usize::from(self.dry.contains(&true))
     }
 
     /// Whether set-valued friction holds a joint in a sample.
@@ -66,7 +89,7 @@ impl<'a, const N: usize> Building<'a, N> {
 
     /// Takes what resting joints hold out of the right-hand side.
     pub fn take_held(&self, rows: &mut RegressionRows) {
-        let Some(held) = rows.columns.get_mut(self.unknowns.len()) else {
+        let Some(held) = rows.columns.get_mut(self.columns()) else {
             return;
         };
         for (k, &i) in rows.samples.iter().enumerate() {
@@ -102,15 +125,21 @@ impl<'a, const N: usize> Building<'a, N> {
         self.memory.advance(&at.motion, 1.0 / trial.rate);
         let memory = &self.memory;
         let predicted = self.prediction.as_mut();
-        let predicted = predicted.map_or_else(Nearby::default, |p| p.next(model, trial, motion));
+        let predicted = predicted.map(|p| p.next(model, trial, motion));
+        let mut influence =
+            predicted.map(|force| Influence::at((model, trial, motion), memory, force, i));
         let measured = at.measured - resisting_torque(&model.held, &at.motion, &memory.held);
         rows.rhs[here.clone()].copy_from_slice(measured.as_slice());
-        let y = regressor(&chain, &at.pose, qd, qdd);
-        let fixed = inverse_dynamics(&chain, &at.pose, qd, qdd);
-        let inertial: [[Joints<f64, N>; 4]; N] =
-            core::array::from_fn(|s| y.segment_columns(&chain, s));
-        let mut explained = Joints::<f64, N>::zeros();
-        for (unknown, values) in unknowns.iter().zip(&mut rows.columns) {
+        let mut inertial = [[Joints::<f64, N>::zeros(); 4]; N];
+        if self.has_held_part || self.wants_segments {
+            let y = regressor(&chain, &at.pose, qd, qdd);
+            inertial = core::array::from_fn(|s| y.segment_columns(&chain, s));
+        }
+        let wanted = unknowns
+            .iter()
+            .zip(&self.wanted)
+            .filter(|(_, wanted)| **wanted);
+        for ((unknown, _), values) in wanted.zip(&mut rows.columns) {
             let column = match unknown.source {
                 Source::Segment(s, moment) => inertial[s][position(moment)],
                 Source::Effect(e, p) => {
@@ -119,20 +148,24 @@ impl<'a, const N: usize> Building<'a, N> {
                 Source::RestTorque(e, p) => {
                     gradient(&unit(&self.regressed[e]), p, &at.motion, memory.fitted[e])
                 }
-                Source::Calibration(what) => {
-                    influence(model, trial, motion, (&predicted, memory, i), what)
-                }
+                Source::Calibration(what) => influence
+                    .as_mut()
+                    .map_or_else(Joints::zeros, |at| at.of(what)),
             };
-            if let Source::Segment(s, moment) = unknown.source {
-                explained += column * value_of(&chain, s, moment);
-            }
             let torques =
                 Joints::<f64, N>::from_fn(|j, _| if self.rests(i, j) { 0.0 } else { column[j] });
             values[here.clone()].copy_from_slice(torques.as_slice());
         }
-        // What the rigid arm does besides the unknown moments: rotors, held normal moments, held segments.
-        for (j, value) in rows.rhs[here].iter_mut().enumerate() {
-            *value -= fixed[j] - explained[j];
+        if self.has_held_part {
+            let mut held = inverse_dynamics(&chain, &at.pose, qd, qdd);
+            for unknown in unknowns {
+                if let Source::Segment(s, moment) = unknown.source {
+                    held -= inertial[s][position(moment)] * value_of(&chain, s, moment);
+                }
+            }
+            for (value, held) in rows.rhs[here].iter_mut().zip(&held) {
+                *value -= held;
+            }
         }
     }
 }
@@ -146,6 +179,19 @@ fn position(moment: Moment) -> usize {
     }
 }
 
+/// Whether the column of an unknown along a given motion is another one for another estimate: imperfections of the measurement are seen
+/// through the force that the model predicts, and some effects through the force in their joint or through states of their own.
+pub(crate) fn follows_estimate<const N: usize>(model: &Model<N>, unknown: &Unknown) -> bool {
+    match unknown.source {
+        Source::Segment(..) => false,
+        Source::Calibration(_) => true,
+        Source::Effect(e, _) | Source::RestTorque(e, _) => {
+            let effect = &model.fitted[e];
+            effect.kind.feels_force() || effect.remembers()
+        }
+    }
+}
+
 /// The model's own value of an inertial parameter.
 pub fn value_of<const N: usize>(chain: &Chain<f64, N>, segment: usize, moment: Moment) -> f64 {
     let s = &chain.segments()[segment];
@@ -155,6 +201,20 @@ pub fn value_of<const N: usize>(chain: &Chain<f64, N>, segment: usize, moment: M
         Moment::Normal => s.mass * s.com[1],
         Moment::Inertia => s.inertia + s.mass * (s.com[0] * s.com[0] + s.com[1] * s.com[1]),
     }
+}
+
+/// Whether an arm has rotors, or moments of segments that are neither unknown nor zero.
+fn has_held_part<const N: usize>(chain: &Chain<f64, N>, unknowns: &[Unknown]) -> bool {
+    let is_unknown = |s, moment| {
+        let source = Source::Segment(s, moment);
+        unknowns.iter().any(|u| u.source == source)
+    };
+    let moments = [Moment::Mass, Moment::Along, Moment::Normal, Moment::Inertia];
+    let holds = |s| {
+        let held = |&m: &Moment| value_of(chain, s, m) != 0.0 && !is_unknown(s, m);
+        moments.iter().any(held)
+    };
+    (0..N).any(holds) || chain.rotor_inertia().iter().any(|&rotor| rotor != 0.0)
 }
 
 /// The joints that set-valued dry friction can hold.
