@@ -91,19 +91,17 @@ impl<const N: usize> Task<'_, N> {
         let (mut shown, mut refused, mut settled) = (at.clone(), None, false);
         let (mut share, mut before) = (1.0, f64::INFINITY);
         for _ in 0..most {
-            if simulate {
-                // Rows take most of the memory: those of the last round make room first.
-                prepared.clear();
-            }
-            let again = !prepared.is_empty();
+            let again = !simulate && !prepared.is_empty();
             let follows = |u| !again || follows_estimate(&at.model, u);
             let wanted: Vec<bool> = unknowns.iter().map(follows).collect();
+            make_room(&mut prepared, &wanted);
             let delay = delay(unknowns, &at.x);
             let how = (cutoff, simulate, delay, assistance);
             match prepare((&at.model, unknowns, &wanted), trials, how, threads) {
                 Ok(fresh) => renew(&mut prepared, fresh, &wanted),
                 // A step too far makes an arm that cannot be simulated: half of it is a step too.
                 Err(error) if last.is_some() => {
+                    prepared.clear();
                     at = shown.towards(&at.x, 0.5, unknowns)?;
                     refused = Some(error);
                     continue;
@@ -239,7 +237,20 @@ fn share_of_step(last: f64, moved: f64, before: f64) -> f64 {
     }
 }
 
-/// Puts fresh columns of the wanted unknowns, and right-hand sides, in the place of those in the rows of every trial, if there are any.
+/// Frees what is built anew in the rows of every trial, as they take most of the memory: columns of the wanted unknowns and right-hand sides.
+fn make_room(prepared: &mut Vec<Pieces>, wanted: &[bool]) {
+    if wanted.iter().all(|&wanted| wanted) {
+        prepared.clear();
+    }
+    for rows in prepared.iter_mut().flatten() {
+        let columns = rows.columns.iter_mut().zip(wanted);
+        let freed = columns.filter(|(_, wanted)| **wanted);
+        freed.for_each(|(column, _)| *column = Vec::new());
+        (rows.rhs, rows.held) = (Vec::new(), None);
+    }
+}
+
+/// Puts fresh columns of the wanted unknowns, and right-hand sides, into the rows of every trial, if there are any.
 fn renew(prepared: &mut Vec<Pieces>, fresh: Vec<Pieces>, wanted: &[bool]) {
     if prepared.is_empty() {
         *prepared = fresh;
