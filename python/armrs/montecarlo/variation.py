@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -154,9 +155,8 @@ def _within(value: object, kind: str, numbers: tuple[float, ...]) -> tuple[float
     low, high = checks.pair("within", value)
     if not low < high:
         raise BadInput("within", [low, high], "low and high, low first")
-    from scipy.stats import norm
-
-    inside = float(norm.cdf(high, *numbers) - norm.cdf(low, *numbers))
+    normal = NormalDist(*numbers)
+    inside = normal.cdf(high) - normal.cdf(low)
     if inside < _LEAST_INSIDE:
         raise BadInput("within", [low, high], f"limits that hold at least {_LEAST_INSIDE:g} of the distribution, here {inside:.2g}")
     return low, high

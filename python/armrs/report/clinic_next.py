@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from statistics import NormalDist
 from typing import Any
 
 from ..analysis.significance import CHANGE_LEVEL
@@ -144,9 +145,7 @@ def repeats_needed(change: Change, now: int) -> float:
     The variance of this session is taken as that of the mean of its repeats, `s² n / n'` for n' instead of n; that of the other session
     stays. Over all quantities compared the limit is that of Bonferroni, which no step of Holm's exceeds.
     """
-    from scipy.stats import norm
-
-    limit = float(norm.ppf(1.0 - 0.5 * CHANGE_LEVEL / max(1, change.compared)))
+    limit = NormalDist().inv_cdf(1.0 - 0.5 * CHANGE_LEVEL / max(1, change.compared))
     both = (change.either_way / 1.96) ** 2
     allowed = (change.value / limit) ** 2 - max(0.0, both - change.own_std**2)
     if allowed <= 0.0:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -42,6 +42,7 @@ _STYLE: dict[str, Any] = {
     "axes.titlesize": 10.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,
     "axes.labelsize": 10.0,
     "axes.edgecolor": GREY,
     "axes.linewidth": 0.8,
@@ -66,7 +67,8 @@ _STYLE: dict[str, Any] = {
     "savefig.facecolor": "white",
     "text.parse_math": False,
 }
-"""Names of joints, movements and files are shown as they stand, whatever `$` they have in them. Tick labels of six digits would collide."""
+"""Names of joints, movements and files are shown as they stand, whatever `$` they have in them. Tick labels of six digits would collide. No
+panel has ticks above it, so the height of titles need not be measured."""
 
 
 def style() -> AbstractContextManager[None]:
@@ -97,18 +99,60 @@ def grid(count: int) -> tuple[int, int]:
     return -(-max(1, count) // columns), columns
 
 
-def figure(width: float, height: float) -> Figure:
+def figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """Return an empty figure [inches]; but for `in_pyplot`, it is in no window and no global state."""
     if _IN_PYPLOT.get():
         from matplotlib import pyplot
 
-        return pyplot.figure(figsize=(width, height), layout="constrained")
+        return pyplot.figure(figsize=(width, height), layout=layout)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(width, height), layout="constrained")
+    made = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(made)
     return made
+
+
+_LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.8, 0.15, 0.35, 0.5, 0.35
+"""Room about a panel for its labels, and between two of a column [inches]."""
+
+
+def pairs(count: int, width: float, height: float, ratio: float) -> tuple[Figure, np.ndarray]:
+    """Return a figure of so many panels above others of the same time or angle, and the Axes, shape (2, count).
+
+    There is room for labels of six digits, and for a title and a legend above each panel: to measure them would take longer than to draw.
+
+    Parameters
+    ----------
+    count : int
+        Panels side by side.
+    width, height : float
+        Of a pair [inches].
+    ratio : float
+        Height of an upper panel over that of the lower one.
+    """
+    made = figure(width * count, height, None)
+    across, high = width - _LEFT - _RIGHT, height - _TOP - _BOTTOM - _BETWEEN
+    axes = made.subplots(
+        2,
+        count,
+        squeeze=False,
+        sharex="col",
+        gridspec_kw={
+            "height_ratios": (ratio, 1.0),
+            "left": _LEFT / (width * count),
+            "right": 1.0 - _RIGHT / (width * count),
+            "top": 1.0 - _TOP / height,
+            "bottom": _BOTTOM / height,
+            "wspace": (_LEFT + _RIGHT) / across,
+            "hspace": _BETWEEN / (0.5 * high),
+        },
+    )
+    for ax in axes.ravel():
+        ax.locator_params(nbins=6)
+        ax.yaxis.set_label_coords((0.18 - _LEFT) / across, 0.5)
+        ax.xaxis.set_label_coords(0.5, (0.2 - _BOTTOM) * (1.0 + ratio) / high)
+    return made, axes
 
 
 def halo() -> list[Any]:
@@ -130,7 +174,7 @@ def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
             engine.execute(figure)
             figure.set_layout_engine("none")
         # `savefig` would lay the figure out twice, and draw it once more to no end.
-        canvas.print_png(target)  # type: ignore[no-untyped-call]
+        canvas.print_png(target, pil_kwargs={"compress_level": 4})  # type: ignore[no-untyped-call]
 
 
 def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:

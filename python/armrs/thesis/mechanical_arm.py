@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -311,14 +312,12 @@ def expected(exact: bool) -> dict[str, float]:
 
 def _chances() -> Sheet:
     """Return how often an experiment comes within the limits, with exact and with calibrated sensors, beside the thesis' error."""
-    from scipy.stats import norm
-
     reference, thesis = _reference(True), {name: row[1] for name, row in MECHANICAL["Table 4.5"].items()}
     thesis["m1·l1 + a1·m2"] = thesis["m1·l1"] + 0.376 * thesis["m2"]
     rows = []
     for name, limit in LIMITS.items():
         stds = [expected(exact)[name] for exact in (True, False)]
-        chances = [100.0 * (2.0 * norm.cdf(limit / std) - 1.0) for std in stds]
+        chances = [100.0 * math.erf(limit / std / math.sqrt(2.0)) for std in stds]
         rows.append([
             f"{name} within {limit:g} %", f"{stds[0]:.2f}", f"{chances[0]:.1f}", f"{stds[1]:.2f}", f"{chances[1]:.1f}",
             f"{100 * (thesis[name] / reference[name] - 1):+.1f}",

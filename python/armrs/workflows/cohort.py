@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -297,10 +298,8 @@ def _mean_of(cells: Iterable[tuple[str, str]], group: str, sides: Set[str]) -> n
 
 
 def _quantity(fitted: MixedModel, place: int, named: tuple[str, str, str, str], own: Sequence[Value]) -> Quantity:
-    from scipy.stats import norm
-
     mean, variance = float(fitted.coefficients[place]), float(fitted.covariance[place, place])
-    freedom, z = fitted.total_freedom, float(norm.ppf(0.5 + 0.5 * LEVEL))
+    freedom, z = fitted.total_freedom, NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
     half = float(students_t.quantile(LEVEL, freedom) * np.hypot(fitted.total, np.sqrt(variance)))
     end_std = float(np.sqrt(variance + z**2 * fitted.total**2 / (2.0 * freedom)))
     ends = [mean - z * fitted.total, mean + z * fitted.total]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -347,8 +348,6 @@ def _not_last(date: str, later: Sequence[str]) -> tuple[str, ...]:
 
 def change(points: Sequence[_Point]) -> tuple[float, float, float]:
     """Return the last value less the weighted mean of those before, its deviation, and the two-sided probability."""
-    from scipy.stats import norm
-
     if len(points) < 2:
         return _NO_TEST
     values, stds = np.array([p[1] for p in points]), np.array([max(p[2], 1e-300) for p in points])
@@ -356,4 +355,4 @@ def change(points: Sequence[_Point]) -> tuple[float, float, float]:
     mean = float(np.sum(weights * values[:-1]) / np.sum(weights))
     mean_std = float(stds[:-1].min() / np.sqrt(np.sum(weights)))
     difference, std = float(values[-1]) - mean, float(np.hypot(stds[-1], mean_std))
-    return difference, std, float(2.0 * norm.sf(abs(difference) / std))
+    return difference, std, math.erfc(abs(difference) / std / math.sqrt(2.0))

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from statistics import NormalDist
 from typing import Protocol
 
 import numpy as np
@@ -372,10 +373,8 @@ def _whose(connection: sqlite3.Connection) -> str | None:
 
 
 def _deviation(estimate: Estimate, level: float) -> float:
-    from scipy.stats import norm
-
     low, high = estimate.interval
-    return float(max(high - estimate.value, estimate.value - low) / norm.ppf(0.5 + 0.5 * level))
+    return max(high - estimate.value, estimate.value - low) / NormalDist().inv_cdf(0.5 + 0.5 * level)
 
 
 def _usable(estimate: Estimate) -> bool:
