@@ -303,3 +303,80 @@ impl<const N: usize> Sample<N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::{KINDS, Place};
+    use arm_core::{Contact, Segment, sample_arms};
+
+    use super::*;
+    use crate::regression::measured_motion::measured;
+    use crate::regression::trial::Tolerance;
+    use crate::regression::unknown::unknowns;
+
+    fn trial() -> Trial<2> {
+        let course = |i: i32, rate: f64| libm::sin(rate * f64::from(i));
+        let q = |i| Joints::from([-1.0 + 0.5 * course(i, 0.03), 0.9 + 0.4 * course(i, 0.05)]);
+        Trial {
+            force_on_arm: Some((0..200).map(|i| [5.0 * course(i, 0.04), 9.0]).collect()),
+            torque: Some((0..200).map(|i| Joints::repeat(course(i, 0.02))).collect()),
+            ..Trial::new(100.0, (0..200).map(q).collect())
+        }
+    }
+
+    /// The mechanical arm with an effect in its elbow. Its masses, and the parameters that a fit finds, are these parts of a whole.
+    fn estimated(kind: arm_core::effect::Kind, part: f64) -> Model<2> {
+        let arm = sample_arms::mechanical_arm();
+        let segments = arm.segments().map(|s| Segment {
+            mass: s.mass * (0.5 + part),
+            ..s
+        });
+        let mut effect = Effect::new(kind, 1);
+        for (value, p) in effect.parameters.iter_mut().zip(kind.info().parameters) {
+            if p.linear {
+                *value = part.clamp(p.min, p.max);
+            }
+        }
+        Model {
+            chain: Chain::new(segments, arm.base(), arm.gravity()).unwrap(),
+            segment_uncertainty: 0.1,
+            fitted: vec![effect],
+            held: Vec::new(),
+            contact: Contact::new([1e4; 2], [25.0; 2]),
+        }
+    }
+
+    /// What a later round does not compute again is the same for any estimate, whatever the kind of the effect; and what it computes again
+    /// it puts where it belongs.
+    #[test]
+    fn only_columns_that_follow_the_estimate_are_others_for_another_estimate() {
+        let (trial, mut renewed) = (trial(), 0);
+        let motion = measured(&trial, 5.0).unwrap();
+        for &kind in KINDS.iter().filter(|k| k.info().place == Place::Joint) {
+            let models = [0.3, 0.7].map(|part| estimated(kind, part));
+            let unknowns = unknowns(&models[0], &Tolerance::default(), &[&trial]);
+            let of = |model| Building::new((model, &unknowns), &trial, &motion);
+            let [one, other] = [0, 1].map(|k| of(&models[k]).next(trial.len()));
+            let follow: Vec<bool> = unknowns
+                .iter()
+                .map(|u| follows_estimate(&models[0], u))
+                .collect();
+            let fresh = of(&models[1]).of_only(&follow).next(trial.len());
+            assert_eq!(fresh.rhs, other.rhs);
+            let mut fresh = fresh.columns.iter();
+            for (u, follows) in follow.into_iter().enumerate() {
+                if follows {
+                    assert_eq!(fresh.next(), Some(&other.columns[u]));
+                    renewed += usize::from(one.columns[u] != other.columns[u]);
+                } else {
+                    assert_eq!(
+                        one.columns[u], other.columns[u],
+                        "{kind:?} {}",
+                        unknowns[u].name
+                    );
+                }
+            }
+        }
+        assert!(renewed > 0);
+    }
+}
