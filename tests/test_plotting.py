@@ -190,3 +190,27 @@ def test_names_above_the_sketch_cross_neither_arm_nor_robot(count: int, ax: matp
         if line.get_alpha() is None and len(line.get_xdata()) > 1:
             path = line.get_path().transformed(line.get_transform())
             assert not any(path.intersects_bbox(box, filled=False) for box in boxes)
+
+
+@pytest.mark.parametrize("title", ["shoulder", "flexion of the left elbow"])
+def test_labels_of_pairs_of_panels_stay_apart_whatever_they_say(title: str) -> None:
+    t = np.linspace(0.0, 10.0, 50)
+    with plotting.style():
+        figure, axes = plotting.pairs([title, title], 4.9, 5.6, 1.7)
+        for above, below in axes.T:
+            plotting.hysteresis([(t, -0.0025 * t)], [(t, -0.001 * t)], above, title=title)
+            plotting.mean_and_spread(t, -0.0025 * t, t, above, label="elastic mean")
+            above.set_xlabel("")
+            plotting.mean_and_spread(t, -0.0025 * t, 0.0 * t, below, label="half width (dissipative)")
+        figure.draw_without_rendering()
+    shown = []
+    for ax in axes.ravel():
+        low, high = ax.get_ylim()
+        ticks = [tick for tick in ax.get_yticklabels() if low <= tick.get_position()[1] <= high]
+        shown += [text for text in (ax.yaxis.label, ax.xaxis.label, *ticks) if text.get_text()]
+        shown.append(ax.get_legend())
+    boxes = [text.get_window_extent() for text in shown] + [ax.get_window_extent() for ax in axes.ravel()]
+    whole = figure.bbox
+    assert all(whole.x0 <= b.x0 and b.x1 <= whole.x1 and whole.y0 <= b.y0 and b.y1 <= whole.y1 for b in boxes)
+    overlaps = [(a, b) for k, a in enumerate(boxes) for b in boxes[:k] if a.overlaps(b)]
+    assert not overlaps

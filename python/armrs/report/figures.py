@@ -241,7 +241,7 @@ def _torques(result: Identified, configuration: str, joints: Sequence[str]) -> D
     """Draw torques of a trial, and what is left in all repeats of its movement."""
     own = [e for e in result.explained if e.trial.configuration == configuration]
     shown = next((e for e in own if e.trial.role == "test"), own[0])
-    figure, axes = plotting.pairs(len(joints), 5.0, 4.6, 2.0)
+    figure, axes = plotting.pairs(joints, 5.0, 4.6, 2.0)
     for j, name in enumerate(joints):
         plotting.torque(_elapsed(shown), shown.measured[:, j], shown.fitted[:, j], axes[0, j], title=name)
         plotting.residual([(_elapsed(e), e.measured[:, j] - e.fitted[:, j], e.trial.role) for e in own], axes[1, j])
@@ -358,7 +358,7 @@ def _hysteresis(result: PassiveMoments, configuration: str, names: Sequence[str]
     """Draw the samples of a configuration by direction of motion, elastic mean and half width."""
     curves = [c for c in result.curves if c.configuration == configuration]
     own = [m for m in result.trials if m.trial.configuration == configuration]
-    figure, axes = plotting.pairs(len(curves), 4.9, 5.6, 1.7)
+    figure, axes = plotting.pairs([names[c.joint - 1] for c in curves], 4.9, 5.6, 1.7)
     for (above, below), curve in zip(axes.T, curves, strict=True):
         j = curve.joint - 1
         rising, falling = ([(m.q[d, j], m.moment[d, j]) for m in own for d in [m.direction[:, j] == sign]] for sign in (1, -1))

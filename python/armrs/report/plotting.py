@@ -42,7 +42,6 @@ _STYLE: dict[str, Any] = {
     "axes.titlesize": 10.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
-    "axes.titley": 1.0,
     "axes.labelsize": 10.0,
     "axes.edgecolor": GREY,
     "axes.linewidth": 0.8,
@@ -67,8 +66,7 @@ _STYLE: dict[str, Any] = {
     "savefig.facecolor": "white",
     "text.parse_math": False,
 }
-"""Names of joints, movements and files are shown as they stand, whatever `$` they have in them. Tick labels of six digits would collide. No
-panel has ticks above it, so the height of titles need not be measured."""
+"""Names of joints, movements and files are shown as they stand, whatever `$` they have in them. Tick labels of six digits would collide."""
 
 
 def style() -> AbstractContextManager[None]:
@@ -113,41 +111,43 @@ def figure(width: float, height: float, layout: Literal["constrained"] | None = 
     return made
 
 
-_LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.8, 0.15, 0.35, 0.5, 0.35
+_LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.95, 0.15, 0.35, 0.5, 0.35
 """Room about a panel for its labels, and between two of a column [inches]."""
+_SHORT = 13
+"""Letters of a title beside which a legend of three stands; that of a longer one needs room below its panel."""
 
 
-def pairs(count: int, width: float, height: float, ratio: float) -> tuple[Figure, np.ndarray]:
-    """Return a figure of so many panels above others of the same time or angle, and the Axes, shape (2, count).
+def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> tuple[Figure, np.ndarray]:
+    """Return a figure of panels side by side, each above another one of the same time or angle, and the Axes, shape (2, n).
 
-    There is room for labels of six digits, and for a title and a legend above each panel: to measure them would take longer than to draw.
+    With short titles the margins are fixed: there is room for tick labels of seven letters, and for a title and a legend above each panel.
+    To measure them would take longer than to draw.
 
     Parameters
     ----------
-    count : int
-        Panels side by side.
+    titles : sequence of str
+        What will stand above the upper panels.
     width, height : float
-        Of a pair [inches].
+        Of two panels [inches].
     ratio : float
         Height of an upper panel over that of the lower one.
     """
+    count = max(len(titles), 1)
+    of_both: dict[str, Any] = {"squeeze": False, "sharex": "col", "height_ratios": (ratio, 1.0)}
+    if any(len(title) > _SHORT for title in titles):
+        made = figure(width * count, height)
+        return made, made.subplots(2, count, **of_both)
     made = figure(width * count, height, None)
     across, high = width - _LEFT - _RIGHT, height - _TOP - _BOTTOM - _BETWEEN
-    axes = made.subplots(
-        2,
-        count,
-        squeeze=False,
-        sharex="col",
-        gridspec_kw={
-            "height_ratios": (ratio, 1.0),
-            "left": _LEFT / (width * count),
-            "right": 1.0 - _RIGHT / (width * count),
-            "top": 1.0 - _TOP / height,
-            "bottom": _BOTTOM / height,
-            "wspace": (_LEFT + _RIGHT) / across,
-            "hspace": _BETWEEN / (0.5 * high),
-        },
-    )
+    margins = {
+        "left": _LEFT / (width * count),
+        "right": 1.0 - _RIGHT / (width * count),
+        "top": 1.0 - _TOP / height,
+        "bottom": _BOTTOM / height,
+        "wspace": (_LEFT + _RIGHT) / across,
+        "hspace": _BETWEEN / (0.5 * high),
+    }
+    axes = made.subplots(2, count, gridspec_kw=margins, **of_both)
     for ax in axes.ravel():
         ax.locator_params(nbins=6)
         ax.yaxis.set_label_coords((0.18 - _LEFT) / across, 0.5)
