@@ -1,6 +1,6 @@
 """Student's t: intervals and probabilities from few repeats.
 
-From `scipy.special`, as `scipy.stats` takes longer to import than most verbs to compute.
+From `scipy.special`, as importing `scipy.stats` takes a second longer.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ def figure(width: float, height: float, layout: Literal["constrained"] | None = 
 
 
 _LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.95, 0.15, 0.35, 0.5, 0.35
-"""Room about a panel for its labels, and between two of a column [inches]."""
+"""Margins around a panel for its labels, and between two of a column [inches]."""
 _SHORT = 13
 """Letters of a title beside which a legend of three stands; that of a longer one needs room below its panel."""
 

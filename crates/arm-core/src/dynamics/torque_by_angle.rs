@@ -1,4 +1,4 @@
-//! Slopes of the torques that a motion needs to the joint angles.
+//! Derivatives of the joint torques with respect to the joint angles.
 
 use crate::dynamics::inertia::{pairs, to_joint_matrix};
 use crate::dynamics::kinematics::to_links;
@@ -35,7 +35,7 @@ pub fn torque_by_angle<T: Scalar, const N: usize>(
         let [fy, fz] = force_on_arm;
         links[(k, k)] += (upright + a * fy) * pose.cos[k] + (level + a * fz) * pose.sin[k];
         for i in 0..k {
-            // A rotor turns with the angle between two links, whatever their direction.
+            // Without the rotor term of `pairs`, which no angle changes.
             let turning = if i + 1 == k {
                 m[k][i] + products.rotor[k]
             } else {

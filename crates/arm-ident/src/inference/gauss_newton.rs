@@ -237,7 +237,7 @@ fn share_of_step(last: f64, moved: f64, before: f64) -> f64 {
     }
 }
 
-/// Frees what is built anew in the rows of every trial, as they take most of the memory: columns of the wanted unknowns and right-hand sides.
+/// Frees columns of the wanted unknowns, and right-hand sides, before new ones are built: rows take most of the memory.
 fn make_room(prepared: &mut Vec<Pieces>, wanted: &[bool]) {
     if wanted.iter().all(|&wanted| wanted) {
         prepared.clear();
@@ -250,7 +250,7 @@ fn make_room(prepared: &mut Vec<Pieces>, wanted: &[bool]) {
     }
 }
 
-/// Puts fresh columns of the wanted unknowns, and right-hand sides, into the rows of every trial, if there are any.
+/// Puts fresh columns of the wanted unknowns, and right-hand sides, into the rows of every trial; where there are none, the fresh ones are taken whole.
 fn renew(prepared: &mut Vec<Pieces>, fresh: Vec<Pieces>, wanted: &[bool]) {
     if prepared.is_empty() {
         *prepared = fresh;

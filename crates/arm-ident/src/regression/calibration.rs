@@ -116,7 +116,7 @@ pub(crate) struct Influence<'a, const N: usize> {
     pub force: Nearby,
     pub sample: usize,
     pub pose: Pose<f64, N>,
-    /// Slopes of the left-hand side to the angles, once an offset asks for them.
+    /// Slopes of the left-hand side to the angles, once they are needed.
     slopes: Option<JointMatrix<f64, N>>,
 }
 
@@ -195,7 +195,7 @@ impl<'a, const N: usize> Influence<'a, N> {
     }
 }
 
-/// Slopes of what effects resist with to the angles, a column for each joint \[N m/rad\].
+/// Derivatives of the resisting torques of effects with respect to the angles, a column for each joint \[N m/rad\].
 fn resistance_by_angle<const N: usize>(
     effects: &[Effect<f64>],
     motion: &Motion<f64, N>,
@@ -213,7 +213,7 @@ fn resistance_by_angle<const N: usize>(
             slopes[(own, own)] += to_angle;
             continue;
         }
-        // An effect sees the angle of its own joint and of the one before.
+        // An effect depends on the angle of its own joint and of the one before.
         for joint in own.saturating_sub(1)..=own {
             let [up, down] = [STEP, -STEP].map(|step| {
                 let mut moved = *motion;

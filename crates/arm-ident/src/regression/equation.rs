@@ -179,7 +179,7 @@ fn position(moment: Moment) -> usize {
     }
 }
 
-/// Whether the column of an unknown along a given motion is another one for another estimate: imperfections of the measurement are seen
+/// Whether the column of an unknown along a given motion is taken to depend on the estimate: imperfections of the measurement are seen
 /// through the force that the model predicts, and some effects through the force in their joint or through states of their own.
 pub(crate) fn follows_estimate<const N: usize>(model: &Model<N>, unknown: &Unknown) -> bool {
     match unknown.source {
@@ -324,7 +324,7 @@ mod tests {
         }
     }
 
-    /// The mechanical arm with an effect in its elbow. Its masses, and the parameters that a fit finds, are these parts of a whole.
+    /// The mechanical arm with an effect in its elbow. Masses are scaled by `0.5 + part`; linear parameters are `part`, within their bounds.
     fn estimated(kind: arm_core::effect::Kind, part: f64) -> Model<2> {
         let arm = sample_arms::mechanical_arm();
         let segments = arm.segments().map(|s| Segment {
@@ -346,8 +346,8 @@ mod tests {
         }
     }
 
-    /// What a later round does not compute again is the same for any estimate, whatever the kind of the effect; and what it computes again
-    /// it puts where it belongs.
+    /// What a later round does not compute again is the same for any estimate, whatever the kind of the effect; and the columns that it
+    /// computes again are those of a whole build.
     #[test]
     fn only_columns_that_follow_the_estimate_are_others_for_another_estimate() {
         let (trial, mut renewed) = (trial(), 0);
