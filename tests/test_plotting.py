@@ -192,7 +192,7 @@ def test_names_above_the_sketch_cross_neither_arm_nor_robot(count: int, ax: matp
             assert not any(path.intersects_bbox(box, filled=False) for box in boxes)
 
 
-@pytest.mark.parametrize("title", ["shoulder", "flexion of the left elbow"])
+@pytest.mark.parametrize("title", ["shoulder", "left shoulder", "MMMMMMMM", "flexion of the left elbow"])
 def test_labels_of_pairs_of_panels_stay_apart_whatever_they_say(title: str) -> None:
     t = np.linspace(0.0, 10.0, 50)
     with plotting.style():
@@ -209,6 +209,7 @@ def test_labels_of_pairs_of_panels_stay_apart_whatever_they_say(title: str) -> N
         ticks = [tick for tick in ax.get_yticklabels() if low <= tick.get_position()[1] <= high]
         shown += [text for text in (ax.yaxis.label, ax.xaxis.label, *ticks) if text.get_text()]
         shown.append(ax.get_legend())
+    shown += [ax.title if ax.get_title() else ax._left_title for ax in axes[0]]
     boxes = [text.get_window_extent() for text in shown] + [ax.get_window_extent() for ax in axes.ravel()]
     whole = figure.bbox
     assert all(whole.x0 <= b.x0 and b.x1 <= whole.x1 and whole.y0 <= b.y0 and b.y1 <= whole.y1 for b in boxes)

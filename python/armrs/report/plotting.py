@@ -52,6 +52,8 @@ _STYLE: dict[str, Any] = {
     "axes.formatter.limits": (-4, 5),
     "grid.color": "#EAEAEA",
     "grid.linewidth": 0.8,
+    "xtick.labelsize": 10.0,
+    "ytick.labelsize": 10.0,
     "xtick.color": GREY,
     "ytick.color": GREY,
     "xtick.labelcolor": INK,
@@ -102,19 +104,35 @@ def figure(width: float, height: float, layout: Literal["constrained"] | None = 
     if _IN_PYPLOT.get():
         from matplotlib import pyplot
 
-        return pyplot.figure(figsize=(width, height), layout=layout)
+        made = pyplot.figure(figsize=(width, height), layout=layout)
+        return made if layout else _without_layout(made)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     made = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(made)
+    return made if layout else _without_layout(made)
+
+
+def _without_layout(made: Figure) -> Figure:
+    """Return the figure with its margins as they are, whatever layout users prefer for theirs."""
+    made.set_layout_engine("none")
     return made
 
 
 _LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.95, 0.15, 0.35, 0.5, 0.35
 """Margins around a panel for its labels, and between two of a column [inches]."""
-_SHORT = 13
-"""Letters of a title beside which a legend of three stands; that of a longer one needs room below its panel."""
+_SHORT = 0.8
+"""Width of a title beside which a legend of three stands in these margins [inches]."""
+
+
+def _width(title: str) -> float:
+    """Return the width of a title above a panel [inches]."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextToPath
+
+    font = FontProperties(weight=_STYLE["axes.titleweight"], size=_STYLE["axes.titlesize"])
+    return float(TextToPath().get_text_width_height_descent(title, font, ismath=False)[0] / 72.0)
 
 
 def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> tuple[Figure, np.ndarray]:
@@ -134,8 +152,8 @@ def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> t
     """
     count = max(len(titles), 1)
     of_both: dict[str, Any] = {"squeeze": False, "sharex": "col", "height_ratios": (ratio, 1.0)}
-    if any(len(title) > _SHORT for title in titles):
-        made = figure(width * count, height)
+    if any(_width(title) > _SHORT for title in titles):
+        made = figure(width * count + 0.4, height)
         return made, made.subplots(2, count, **of_both)
     made = figure(width * count, height, None)
     across, high = width - _LEFT - _RIGHT, height - _TOP - _BOTTOM - _BETWEEN
@@ -149,7 +167,7 @@ def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> t
     }
     axes = made.subplots(2, count, gridspec_kw=margins, **of_both)
     for ax in axes.ravel():
-        ax.locator_params(nbins=6)
+        ax.locator_params(nbins=6, steps=[1, 2, 5, 10])
         ax.yaxis.set_label_coords((0.18 - _LEFT) / across, 0.5)
         ax.xaxis.set_label_coords(0.5, (0.2 - _BOTTOM) * (1.0 + ratio) / high)
     return made, axes
