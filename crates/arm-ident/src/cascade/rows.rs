@@ -123,9 +123,11 @@ impl<'a, const N: usize> Building<'a, N> {
         let memory = &self.memory;
         let predicted = self.prediction.as_mut();
         let predicted = predicted.map(|p| p.next(kept, trial, still));
-        let along =
-            |motion| predicted.map(|force| Influence::at((kept, trial, motion), memory, force, i));
-        let mut influence = along(still);
+        let along = |motion| {
+            predicted.map(|force| Influence::at((kept, trial, motion), memory, force, (i, &pose)))
+        };
+        // Both have the same angles.
+        let (mut at_rest, mut in_motion) = (along(still), along(&self.moving));
         let moment = trial.moment_on_arm.as_ref().map_or(0.0, |m| m[i]);
         let mut measured = static_torque(&model.chain, &pose, force, moment)
             - resisting_torque(&kept.held, &at, &memory.held);
@@ -146,11 +148,13 @@ impl<'a, const N: usize> Building<'a, N> {
                     gradient(&model.fitted[e], p, &at, [0.0; MAX_STATES])
                 }
                 Source::Calibration(what) => {
-                    let moving =
-                        (what == Imperfection::NeglectedInertia).then(|| along(&self.moving));
-                    let mut at = moving.flatten();
-                    let at = at.as_mut().or(influence.as_mut());
-                    at.map_or_else(Joints::zeros, |at| at.of(what))
+                    let influence = match what {
+                        Imperfection::NeglectedInertia => &mut in_motion,
+                        _ => &mut at_rest,
+                    };
+                    influence
+                        .as_mut()
+                        .map_or_else(Joints::zeros, |at| at.of(what))
                 }
             };
             column[here.clone()].copy_from_slice(value.as_slice());

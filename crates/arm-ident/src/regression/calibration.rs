@@ -108,25 +108,25 @@ impl<const N: usize> PredictedForce<N> {
 
 /// What one unit of an imperfection adds to the left-hand side of the rows of one sample \[N m\].
 pub(crate) struct Influence<'a, const N: usize> {
-    pub model: &'a Model<N>,
-    pub trial: &'a Trial<N>,
-    pub motion: &'a Kinematics<N>,
-    pub memory: &'a InternalStates<N>,
+    model: &'a Model<N>,
+    trial: &'a Trial<N>,
+    motion: &'a Kinematics<N>,
+    memory: &'a InternalStates<N>,
     /// The predicted force on the arm.
-    pub force: Nearby,
-    pub sample: usize,
-    pub pose: Pose<f64, N>,
+    force: Nearby,
+    sample: usize,
+    pose: &'a Pose<f64, N>,
     /// Slopes of the left-hand side to the angles, once they are needed.
     slopes: Option<JointMatrix<f64, N>>,
 }
 
 impl<'a, const N: usize> Influence<'a, N> {
-    /// At a sample, with the predicted force on the arm there.
+    /// At a sample, with the pose and the predicted force on the arm there.
     pub fn at(
         (model, trial, motion): (&'a Model<N>, &'a Trial<N>, &'a Kinematics<N>),
         memory: &'a InternalStates<N>,
         force: Nearby,
-        sample: usize,
+        (sample, pose): (usize, &'a Pose<f64, N>),
     ) -> Self {
         Self {
             model,
@@ -135,7 +135,7 @@ impl<'a, const N: usize> Influence<'a, N> {
             memory,
             force,
             sample,
-            pose: Pose::new(&motion.q[sample]),
+            pose,
             slopes: None,
         }
     }
@@ -155,21 +155,20 @@ impl<'a, const N: usize> Influence<'a, N> {
             Imperfection::ForceBias(channel) => {
                 let mut unit = [0.0; 2];
                 unit[channel] = 1.0;
-                static_torque(chain, &pose, unit, 0.0)
+                static_torque(chain, pose, unit, 0.0)
             }
             Imperfection::ForceGain(channel) => {
                 let mut share = [0.0; 2];
                 share[channel] = force.here[channel];
-                static_torque(chain, &pose, share, 0.0)
+                static_torque(chain, pose, share, 0.0)
             }
             Imperfection::TimeDelay => {
                 let span = force.span as f64 / self.trial.rate;
                 let rate = [0, 1].map(|c| (force.after[c] - force.before[c]) / span);
-                -static_torque(chain, &pose, rate, 0.0)
+                -static_torque(chain, pose, rate, 0.0)
             }
             Imperfection::NeglectedInertia => {
-                inverse_dynamics(chain, &pose, &motion.qd[i], &motion.qdd[i])
-                    - gravity(chain, &pose)
+                inverse_dynamics(chain, pose, &motion.qd[i], &motion.qdd[i]) - gravity(chain, pose)
             }
             Imperfection::HandlePlacement(axis) => {
                 // A displaced handle lengthens the lever of the last segment; the moment acts alike on every joint.
@@ -189,7 +188,7 @@ impl<'a, const N: usize> Influence<'a, N> {
         let chain = motion.chain_in_moving_frame(&self.model.chain, i);
         let seen = self.trial.motion(i, q, qd);
         let of = |effects, memory| resistance_by_angle(effects, &seen, memory);
-        torque_by_angle(&chain, &self.pose, (qd, qdd), self.force.here)
+        torque_by_angle(&chain, self.pose, (qd, qdd), self.force.here)
             + of(&self.model.fitted, &self.memory.fitted)
             + of(&self.model.held, &self.memory.held)
     }

@@ -126,8 +126,8 @@ impl<'a, const N: usize> Building<'a, N> {
         let memory = &self.memory;
         let predicted = self.prediction.as_mut();
         let predicted = predicted.map(|p| p.next(model, trial, motion));
-        let mut influence =
-            predicted.map(|force| Influence::at((model, trial, motion), memory, force, i));
+        let mut influence = predicted
+            .map(|force| Influence::at((model, trial, motion), memory, force, (i, &at.pose)));
         let measured = at.measured - resisting_torque(&model.held, &at.motion, &memory.held);
         rows.rhs[here.clone()].copy_from_slice(measured.as_slice());
         let mut inertial = [[Joints::<f64, N>::zeros(); 4]; N];
