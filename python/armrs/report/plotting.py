@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Literal
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -99,24 +99,17 @@ def grid(count: int) -> tuple[int, int]:
     return -(-max(1, count) // columns), columns
 
 
-def figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+def figure(width: float, height: float) -> Figure:
     """Return an empty figure [inches]; but for `in_pyplot`, it is in no window and no global state."""
     if _IN_PYPLOT.get():
         from matplotlib import pyplot
 
-        made = pyplot.figure(figsize=(width, height), layout=layout)
-        return made if layout else _without_layout(made)
+        return pyplot.figure(figsize=(width, height), layout="constrained")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(width, height), layout=layout)
+    made = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(made)
-    return made if layout else _without_layout(made)
-
-
-def _without_layout(made: Figure) -> Figure:
-    """Return the figure with its margins as they are, whatever layout users prefer for theirs."""
-    made.set_layout_engine("none")
     return made
 
 
@@ -155,7 +148,8 @@ def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> t
     if any(_width(title) > _SHORT for title in titles):
         made = figure(width * count + 0.4, height)
         return made, made.subplots(2, count, **of_both)
-    made = figure(width * count, height, None)
+    made = figure(width * count, height)
+    made.set_layout_engine("none")
     across, high = width - _LEFT - _RIGHT, height - _TOP - _BOTTOM - _BETWEEN
     margins = {
         "left": _LEFT / (width * count),
