@@ -1,7 +1,7 @@
 //! The closed chain at one instant: from state and drive to accelerations, forces and powers.
 
 use arm_core::effect::{
-    Effect, Local, Motion, States, any_state, resisting_besides_dry, resisting_torque,
+    Effect, Local, Motion, States, any_state, dry_friction, resisting_besides_dry, resisting_torque,
 };
 use arm_core::{
     Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
@@ -55,6 +55,8 @@ pub(crate) struct Model<T, const N: usize> {
     pub has_dry: bool,
     /// Whether some of it depends on speed.
     pub dry_falls: bool,
+    /// Its largest torque in each joint, where nothing changes that.
+    constant_dry: Option<[T; N]>,
     pub products: Products<T, N>,
     /// Whether an effect depends on states of its own.
     pub has_memory: bool,
@@ -95,8 +97,15 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let feels_besides_dry = |e: &Effect<T>| !e.is_dry() && feels_joint_force(e);
         let has_dry = dry.contains(&true);
         let resists = |e: &Effect<T>| e.on && (!has_dry || resists_besides_dry(e));
+        let is_constant = effects
+            .iter()
+            .filter(is_dry)
+            .all(|effect| effect.kind.is_rate_independent());
+        let zero = Joints::<T, N>::repeat(T::ZERO);
+        let at_rest = || dry_friction(&effects, &Motion::new(T::ZERO, zero, zero), &[]);
         Ok(Self {
             affine,
+            constant_dry: is_constant.then(at_rest),
             resists_otherwise: others.iter().any(resists),
             others,
             products: Products::of(&chain),
@@ -129,6 +138,13 @@ impl<T: Scalar, const N: usize> Model<T, N> {
     pub fn is_smooth(&self) -> bool {
         let has_play = matches!(&self.link, Link::Compliant(contact) if !contact.has_no_play());
         !self.has_dry && !has_play && self.others.is_empty()
+    }
+
+    /// Whether neither the speed of a joint nor the force through it changes its dry friction, and nothing but that holds joints: then
+    /// [`steady`](crate::integrators::friction::steady) makes most steps.
+    #[inline]
+    pub fn has_simple_friction(&self) -> bool {
+        self.has_dry && !self.dry_falls && !self.feels_joint_force && self.in_link_form()
     }
 
     /// The rig, where it is a plain one.
@@ -269,6 +285,15 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         *total = sum(total, &others);
     }
 
+    /// Largest torque of the set-valued dry friction of each joint \[N m\].
+    #[inline]
+    pub fn dry_friction(&self, motion: &Motion<T, N>, memory: &[States<T>]) -> [T; N] {
+        match &self.constant_dry {
+            Some(most) => *most,
+            None => dry_friction(&self.effects, motion, memory),
+        }
+    }
+
     /// Time derivatives of the effects' own states.
     pub fn memory_rates(
         &self,
@@ -308,15 +333,26 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 (memory, &mut resisting, &mut force),
             )
         };
-        let v = match &self.link {
-            Link::Forced(_) => self.tip_velocity(qd, &pose),
-            _ => input.handle.velocity,
-        };
+        let v = self.velocity_of_force(input, qd, &pose);
         Outcome {
             qdd,
             force_on_arm: force,
             power: powers((force, v), [&driving, &resisting], qd, lost),
             joint_force: motion.joint_force,
+        }
+    }
+
+    /// Velocity of what the force on the arm acts between: the handle, or the tip where the force is given \[m/s\].
+    #[inline(always)]
+    pub fn velocity_of_force(
+        &self,
+        input: &Input<T, N>,
+        qd: &Joints<T, N>,
+        pose: &Pose<T, N>,
+    ) -> Plane<T> {
+        match &self.link {
+            Link::Forced(_) => self.tip_velocity(qd, pose),
+            _ => input.handle.velocity,
         }
     }
 

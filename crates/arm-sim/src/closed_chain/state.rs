@@ -79,6 +79,28 @@ impl<T: Scalar, const N: usize> Input<T, N> {
     }
 }
 
+impl<const L: usize, const N: usize> Input<Lanes<L>, N> {
+    /// What drives one lane.
+    pub fn lane(&self, lane: usize) -> Input<f64, N> {
+        let plane = |of: &Plane<Lanes<L>>| [of[0].0[lane], of[1].0[lane]];
+        Input {
+            time: self.time.0[lane],
+            handle: Handle {
+                position: plane(&self.handle.position),
+                velocity: plane(&self.handle.velocity),
+                acceleration: plane(&self.handle.acceleration),
+            },
+            torque: Joints::from_fn(|j, _| self.torque[j].0[lane]),
+            base: BaseMotion {
+                position: plane(&self.base.position),
+                velocity: plane(&self.base.velocity),
+                acceleration: plane(&self.base.acceleration),
+            },
+            activity: core::array::from_fn(|j| self.activity[j].0[lane]),
+        }
+    }
+}
+
 /// Angles, speeds and the work done so far.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State<T, const N: usize> {

@@ -6,7 +6,7 @@ use crate::engines::group::{Group, Outcomes};
 use crate::engines::simulate::simulate;
 use crate::integrators::input_buffer::InputBuffer;
 use crate::preparation::prepared_run::{Prepared, commands};
-use crate::{Experiment, SimulationError};
+use crate::{Experiment, Integrator, SimulationError};
 use arm_core::simd_dispatch::has_registers_of_eight;
 
 /// Most groups in a set. If they share a drive, it is computed once for all.
@@ -96,15 +96,18 @@ fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcome
     outcomes
 }
 
-/// Whether a run may run beside others: the switches of dry friction are of each run alone.
+/// Whether a run may run beside others: with dry friction if most steps need no switch. Semi-implicit Euler looks for switches in each.
 fn may_be_beside<const N: usize>(run: &Prepared<N>) -> bool {
-    !run.model.has_dry
+    let is_simple = || run.integrator() == Integrator::Rk4 && run.model.has_simple_friction();
+    !run.model.has_dry || is_simple()
 }
 
 /// Whether two runs take the same steps.
 fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
-    let kinds =
-        |p: &Prepared<N>| -> Vec<_> { p.model.effects.iter().map(|e| (e.kind, e.index)).collect() };
+    let kinds = |p: &Prepared<N>| -> Vec<_> {
+        let effects = p.model.effects.iter();
+        effects.map(|e| (e.kind, e.index, e.is_dry())).collect()
+    };
     a.schedule == b.schedule
         && a.experiment.columns == b.experiment.columns
         && a.integrator() == b.integrator()
@@ -113,6 +116,7 @@ fn alike<const N: usize>(a: &Prepared<N>, b: &Prepared<N>) -> bool {
         && a.setup.is_as_commanded() == b.setup.is_as_commanded()
         && a.model.heaves == b.model.heaves
         && a.model.is_assisted == b.model.is_assisted
+        && a.model.dry == b.model.dry
         && kinds(a) == kinds(b)
 }
 
@@ -265,6 +269,28 @@ mod tests {
                 run.effects = vec![wild; 1];
             } else {
                 run.effects = vec![Effect::new(Kind::Viscous, 1).with(&[0.2])];
+            }
+        });
+    }
+
+    #[test]
+    fn runs_with_dry_friction_that_reverse_at_times_of_their_own() {
+        let coulomb = |joint, torque: f64, smoothing: f64| {
+            Effect::new(Kind::Coulomb, joint).with(&[torque, smoothing])
+        };
+        as_alone(|i, run| {
+            lead_at(1.0 + 0.013 * i as f64, Coupling::Compliant, run);
+            let spring = Effect::new(Kind::Relaxation, 2);
+            run.effects = vec![
+                coulomb(0, 0.1 + 0.02 * i as f64, 0.0),
+                // Of another kind of step, or without friction in this joint.
+                coulomb(1, if i == 13 { 0.0 } else { 0.2 }, 0.0),
+                coulomb(2, 0.05, if i == 30 { 0.01 } else { 0.0 }),
+                spring,
+            ];
+            if i == 40 {
+                run.effects
+                    .push(Effect::new(Kind::Stribeck, 0).with(&[0.1, 0.06, 0.0]));
             }
         });
     }

@@ -1,5 +1,6 @@
 //! Runs in the lanes of one, which make their steps together.
 
+use arm_core::effect::States;
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Joints, Lanes, Plane, Pose, Scalar, Setup};
 
@@ -11,11 +12,12 @@ use crate::engines::packing::{
     pack, pack_assistance, pack_effect, pack_input, pack_link, pack_setup,
 };
 use crate::integrators::divided_step::step_in_pieces;
+use crate::integrators::friction::{steady, switching};
 use crate::integrators::input_buffer::{Ahead, InputBuffer};
 use crate::integrators::step::{Inputs, Memory, step};
 use crate::preparation::prepared_run::{Prepared, commands};
 use crate::recording::recorder::{Instant, Recorder, Row};
-use crate::{Handle, Integrator, Recording, SimulationError};
+use crate::{Columns, Handle, Integrator, Recording, SimulationError};
 
 pub(super) type Outcomes<const N: usize> = Vec<Result<Recording<N>, SimulationError>>;
 
@@ -41,7 +43,11 @@ pub(super) struct Group<'a, 'b, const L: usize, const N: usize> {
     commanded: [Vec<Input<f64, N>>; L],
     state: State<Lanes<L>, N>,
     memory: Memory<Lanes<L>>,
+    /// Room for the states of effects in one lane.
+    alone: Memory<f64>,
     row: Row<Lanes<L>>,
+    /// Room for an instant of one lane.
+    row_alone: Row<f64>,
     recorders: Vec<Recorder<'b, 'static, N>>,
     /// Why a run stopped early.
     stopped: Vec<Option<SimulationError>>,
@@ -75,7 +81,9 @@ impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
                 work: [Lanes::ZERO; 4],
             },
             memory: Memory::new(model.effects.len()),
+            alone: Memory::new(model.effects.len()),
             row: Row::new(),
+            row_alone: Row::new(),
             recorders: prepared
                 .iter()
                 .map(|run| Recorder::new(run))
@@ -99,19 +107,34 @@ impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
         } else {
             pack_input(|i| in_lane(self.prepared, i).input(time))
         };
+        let columns = self.prepared[0].experiment.columns;
+        let recorders = self.recorders.iter_mut().zip(&self.stopped).enumerate();
+        let going = recorders.filter(|(_, (_, stopped))| stopped.is_none());
+        let recorders = going.map(|(i, (recorder, _))| (i, recorder));
+        // Whole recordings never break off.
+        if self.model.has_dry && columns == Columns::All {
+            for (i, recorder) in recorders {
+                copy_lane(i, &self.memory.state, &mut self.alone.state);
+                let instant = Instant {
+                    model: &self.prepared[i].model,
+                    input: &input.lane(i),
+                    state: &self.state.lane(i),
+                    memory: &self.alone.state,
+                };
+                self.row_alone.fill_solved(&instant, columns);
+                let _ = recorder.push(&self.row_alone, |value| *value);
+            }
+            return;
+        }
         let instant = Instant {
             model: &self.model,
             input: &input,
             state: &self.state,
             memory: &self.memory.state,
         };
-        self.row.fill(&instant, self.prepared[0].experiment.columns);
-        let recorders = self.recorders.iter_mut().zip(&self.stopped).enumerate();
-        for (i, (recorder, stopped)) in recorders {
-            if stopped.is_none() {
-                // Whole recordings never break off.
-                let _ = recorder.push(&self.row, |all| all.0[i]);
-            }
+        self.row.fill(&instant, columns);
+        for (i, recorder) in recorders {
+            let _ = recorder.push(&self.row, |all| all.0[i]);
         }
     }
 
@@ -131,9 +154,8 @@ impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
 
     /// Makes steps along one drive of all lanes; returns how many.
     fn advance_along(&mut self, ahead: Ahead<f64, N>) -> usize {
-        let (plain, first) = (self.plain.as_ref(), self.prepared[0]);
-        let steps = Steps::of(&self.model, plain, first);
-        let at = (&mut self.state, &mut self.memory);
+        let steps = Steps::of(&self.model, self.plain.as_ref(), self.prepared);
+        let at = (&mut self.state, &mut self.memory, &mut self.alone);
         dispatch(Advance { steps, ahead, at })
     }
 
@@ -153,27 +175,18 @@ impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
                 out.push(input);
             }
         });
-        let steps = Steps::of(&self.model, self.plain.as_ref(), first);
-        let at = (&mut self.state, &mut self.memory);
+        let steps = Steps::of(&self.model, self.plain.as_ref(), prepared);
+        let at = (&mut self.state, &mut self.memory, &mut self.alone);
         dispatch(Advance { steps, ahead, at })
     }
 
     /// One step of each run by itself.
     pub fn step_apart(&mut self, number: usize) {
-        let (state, memory) = (&mut self.state, &mut self.memory);
-        let mut lane_memory = Memory::new(memory.state.len());
         for i in 0..L {
-            let run = in_lane(self.prepared, i);
-            let mut lane = state.lane(i);
-            let lanes = memory.state.as_flattened_mut();
-            for (one, all) in lane_memory.state.as_flattened_mut().iter_mut().zip(&*lanes) {
-                *one = all.0[i];
-            }
-            step_in_pieces(run, number, (&mut lane, &mut lane_memory));
-            state.set_lane(i, &lane);
-            for (one, all) in lane_memory.state.as_flattened().iter().zip(lanes) {
-                all.0[i] = *one;
-            }
+            let at = (&mut self.state, &mut self.memory);
+            step_lane(i, at, &mut self.alone, |at| {
+                step_in_pieces(in_lane(self.prepared, i), number, at);
+            });
         }
         self.stop_diverged(number);
     }
@@ -203,8 +216,36 @@ impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
     }
 }
 
+/// Takes the states of effects out of one lane.
+fn copy_lane<const L: usize>(lane: usize, all: &[States<Lanes<L>>], one: &mut [States<f64>]) {
+    let states = one.as_flattened_mut().iter_mut();
+    for (one, all) in states.zip(all.as_flattened()) {
+        *one = all.0[lane];
+    }
+}
+
+/// Makes a step of one lane by itself.
+///
+/// * `alone` - room for its states of effects
+fn step_lane<const L: usize, const N: usize>(
+    lane: usize,
+    (state, memory): (&mut State<Lanes<L>, N>, &mut Memory<Lanes<L>>),
+    alone: &mut Memory<f64>,
+    step: impl FnOnce((&mut State<f64, N>, &mut Memory<f64>)),
+) {
+    let mut one = state.lane(lane);
+    copy_lane(lane, &memory.state, &mut alone.state);
+    step((&mut one, alone));
+    state.set_lane(lane, &one);
+    let states = memory.state.as_flattened_mut().iter_mut();
+    for (all, one) in states.zip(alone.state.as_flattened()) {
+        all.0[lane] = *one;
+    }
+}
+
 /// What steps are made of, whatever drives them.
 struct Steps<'a, const L: usize, const N: usize> {
+    runs: &'a [&'a Prepared<'a, N>],
     model: &'a Model<Lanes<L>, N>,
     /// The rig, where it is plain.
     plain: Option<&'a BranchFree<Lanes<L>, N>>,
@@ -213,17 +254,51 @@ struct Steps<'a, const L: usize, const N: usize> {
 }
 
 impl<'a, const L: usize, const N: usize> Steps<'a, L, N> {
-    /// The steps of runs like one of them.
     fn of(
         model: &'a Model<Lanes<L>, N>,
         plain: Option<&'a BranchFree<Lanes<L>, N>>,
-        run: &Prepared<N>,
+        runs: &'a [&'a Prepared<'a, N>],
     ) -> Self {
         Self {
+            runs,
             model,
             plain,
-            integrator: run.integrator(),
-            h: run.schedule.dt,
+            integrator: runs[0].integrator(),
+            h: runs[0].schedule.dt,
+        }
+    }
+
+    /// A step with dry friction: of all lanes together where no joint starts or ceases to slip, by itself of each other one.
+    #[inline(always)]
+    fn step_with_friction(
+        &self,
+        inputs: Inputs<Lanes<L>, N>,
+        (state, memory): (&mut State<Lanes<L>, N>, &mut Memory<Lanes<L>>),
+        alone: &mut Memory<f64>,
+    ) {
+        let before = *state;
+        memory.kept.copy_from_slice(&memory.state);
+        let made = steady(self.model, self.h, inputs, (state, memory));
+        if made.every(|made| made > 0.0) {
+            return;
+        }
+        for i in (0..L).filter(|&i| made.0[i] < 0.0) {
+            state.set_lane(i, &before.lane(i));
+            for (all, kept) in memory.state.iter_mut().zip(&memory.kept) {
+                for (all, kept) in all.iter_mut().zip(kept) {
+                    all.0[i] = kept.0[i];
+                }
+            }
+            let [start, middle, end] =
+                [inputs.start, inputs.middle, inputs.end].map(|input| input.lane(i));
+            let inputs = Inputs {
+                start: &start,
+                middle: &middle,
+                end: &end,
+            };
+            step_lane(i, (state, memory), alone, |at| {
+                switching(&in_lane(self.runs, i).model, self.h, &inputs, at);
+            });
         }
     }
 }
@@ -232,7 +307,11 @@ impl<'a, const L: usize, const N: usize> Steps<'a, L, N> {
 struct Advance<'a, T, const L: usize, const N: usize> {
     steps: Steps<'a, L, N>,
     ahead: Ahead<'a, T, N>,
-    at: (&'a mut State<Lanes<L>, N>, &'a mut Memory<Lanes<L>>),
+    at: (
+        &'a mut State<Lanes<L>, N>,
+        &'a mut Memory<Lanes<L>>,
+        &'a mut Memory<f64>,
+    ),
 }
 
 impl<T: Scalar, const L: usize, const N: usize> Computation for Advance<'_, T, L, N>
@@ -247,7 +326,7 @@ where
         let Self {
             steps,
             ahead,
-            at: (state, memory),
+            at: (state, memory, alone),
         } = self;
         let Some(rig) = steps.plain else {
             for number in 0..ahead.steps {
@@ -260,7 +339,11 @@ where
                     end: &end,
                 };
                 let at = (&mut *state, &mut *memory);
-                step(steps.model, steps.integrator, steps.h, inputs, at);
+                if steps.model.has_dry {
+                    steps.step_with_friction(inputs, at, alone);
+                } else {
+                    step(steps.model, steps.integrator, steps.h, inputs, at);
+                }
                 if !state.is_finite() {
                     return number + 1;
                 }

@@ -1,6 +1,7 @@
 //! One step of each integrator, the same source for single runs and lanes.
 
 use arm_core::effect::{MAX_STATES, Motion, States};
+use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Joints, Scalar};
 
 use crate::closed_chain::model::{Link, Model};
@@ -84,15 +85,40 @@ pub(crate) fn step<T: Scalar, const N: usize>(
 ) {
     match integrator {
         Integrator::SemiImplicitEuler => semi_implicit_euler(model, h, inputs, state, memory),
-        Integrator::Rk4 => rk4(
-            model,
-            (h, inputs),
-            (state, memory),
-            |input, q, qd, memory| model.evaluate(input, q, qd, memory),
-        ),
+        Integrator::Rk4 => {
+            // Every stage by a call of its own, not four times in one piece of code.
+            let evaluate = |input: &_, q: &_, qd: &_, memory: &_| {
+                let moving = (q, qd);
+                dispatch(Stage {
+                    model,
+                    input,
+                    moving,
+                    memory,
+                })
+            };
+            rk4(model, (h, inputs), (state, memory), evaluate);
+        }
     }
     if matches!(model.link, Link::Rigid) {
         model.project(inputs.end, state, (PROJECTIONS, &[false; N]));
+    }
+}
+
+/// What follows at a stage of a step.
+struct Stage<'a, T, const N: usize> {
+    model: &'a Model<T, N>,
+    input: &'a Input<T, N>,
+    moving: (&'a Joints<T, N>, &'a Joints<T, N>),
+    memory: &'a [States<T>],
+}
+
+impl<T: Scalar, const N: usize> Computation for Stage<'_, T, N> {
+    type Output = Outcome<T, N>;
+
+    #[inline(always)]
+    fn call(self) -> Outcome<T, N> {
+        let (q, qd) = self.moving;
+        self.model.evaluate(self.input, q, qd, self.memory)
     }
 }
 

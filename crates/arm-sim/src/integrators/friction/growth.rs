@@ -1,6 +1,6 @@
 //! Joints that accelerate away from rest because their friction falls with speed.
 
-use arm_core::effect::{Motion, States, dry_friction};
+use arm_core::effect::{Motion, States};
 
 use super::instant::{Mode, Modes};
 use crate::closed_chain::model::Model;
@@ -24,8 +24,8 @@ pub(super) fn growth<const N: usize>(
             faster.qd[j] += CHANGE * way;
         }
     }
-    let slow = most.unwrap_or_else(|| dry_friction(&model.effects, motion, memory));
-    let fast = dry_friction(&model.effects, &faster, memory);
+    let slow = most.unwrap_or_else(|| model.dry_friction(motion, memory));
+    let fast = model.dry_friction(&faster, memory);
     let falls = |j: &usize| fast[*j] < slow[*j];
     if !(0..N).any(|j| falls(&j)) {
         return 0.0;

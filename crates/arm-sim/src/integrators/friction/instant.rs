@@ -1,9 +1,10 @@
 //! Dry friction at one instant: the joints that stick, and the friction torques.
 
-use arm_core::effect::{Motion, States, dry_friction, dry_friction_of};
+use arm_core::effect::{Motion, States, dry_friction_of};
 use arm_core::{Joints, Plane, Pose, Resistance, Scalar};
 
 use super::gain::{newton, strongest};
+use super::hold::hold;
 use crate::closed_chain::joint_space::{Constraint, JointSpaceEquation};
 use crate::closed_chain::model::{Link, Model};
 use crate::closed_chain::state::{Input, Outcome, difference, powers, sum};
@@ -54,13 +55,11 @@ impl<T: Scalar, const N: usize> Friction<T, N> {
 }
 
 /// Share by which a torque may exceed the largest friction by rounding.
-const ROUNDING: f64 = 1e-10;
+pub(super) const ROUNDING: f64 = 1e-10;
 /// Speed of a rigidly led joint that is rounding \[rad/s\].
 const LED_STILL: f64 = 1e-9;
 /// Acceleration of a rigidly led joint that is rounding \[rad/s²\].
 const LED_STEADY: f64 = 1e-6;
-/// Share of its own inverse inertia below which what a joint gives to a torque of its friction is rounding.
-const STIFF: f64 = 1e-9;
 /// Passes of Newton's method for friction that grows with the joint force.
 const PASSES: usize = 30;
 /// Determinant of one less the gain of that friction below which it has no unique solution.
@@ -251,7 +250,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         };
         let through = self.through_joints(&response);
         let motion = self.motion.with_joint_force(&through);
-        let most = dry_friction(&model.effects, &motion, memory);
+        let most = model.dry_friction(&motion, memory);
         let gain = |j: usize| {
             let slope = slope(model, &motion, memory, (j, most[j]));
             if slope == 0.0 {
@@ -293,10 +292,7 @@ impl<'a, const N: usize> Arm<'a, N> {
                 found = rubbing.under(self, &mut motion, &difference(driving, &resisting));
             }
         }
-        let v = match &model.link {
-            Link::Forced(_) => model.tip_velocity(qd, &self.pose),
-            _ => self.input.handle.velocity,
-        };
+        let v = model.velocity_of_force(self.input, qd, &self.pose);
         let all = sum(&resisting, &found.dry);
         let lost = self.contact.1;
         Solved {
@@ -400,39 +396,18 @@ impl<'a, const N: usize> Arm<'a, N> {
         sticks: &[bool; N],
         wanted: &Joints<f64, N>,
     ) -> (Joints<f64, N>, [bool; N]) {
-        let (mut held, mut torque) = (*sticks, Joints::<f64, N>::zeros());
-        let mut columns = [*response; N];
-        let (mut m, mut left, mut own) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
+        let still = Response {
+            qdd: Joints::zeros(),
+            force: [0.0; 2],
+        };
+        let (mut columns, mut own) = ([still; N], [0.0; N]);
         for k in (0..N).filter(|&k| sticks[k]) {
             (columns[k], own[k]) = self.column(k);
-            left[k] = response.qdd[k] - wanted[k];
         }
-        for k in (0..N).filter(|&k| sticks[k]) {
-            for i in (0..N).filter(|&i| sticks[i]) {
-                m[i][k] = columns[k].qdd[i];
-            }
-        }
-        for k in 0..N {
-            // NaN counts as stiff.
-            held[k] = sticks[k] && m[k][k] > STIFF * own[k];
-            if !held[k] {
-                continue;
-            }
-            for i in (k + 1..N).filter(|&i| sticks[i]) {
-                let factor = m[i][k] / m[k][k];
-                for c in k..N {
-                    m[i][c] -= factor * m[k][c];
-                }
-                left[i] -= factor * left[k];
-            }
-        }
-        for k in (0..N).rev().filter(|&k| held[k]) {
-            let mut rest = left[k];
-            for c in (k + 1..N).filter(|&c| held[c]) {
-                rest -= m[k][c] * torque[c];
-            }
-            torque[k] = rest / m[k][k];
-        }
+        let left = core::array::from_fn(|k| response.qdd[k] - wanted[k]);
+        let accelerations = columns.map(|column| column.qdd);
+        let (torque, held) = hold(&accelerations, &own, left, &sticks.map(f64::from));
+        let held = held.map(|held| held > 0.0);
         for k in (0..N).filter(|&k| held[k]) {
             response.less(torque[k], &columns[k]);
         }
@@ -469,7 +444,7 @@ impl<const N: usize> Rubbing<'_, N> {
         motion: &mut Motion<f64, N>,
         net: &Joints<f64, N>,
     ) -> Found<N> {
-        let most = dry_friction(&arm.model.effects, motion, self.memory);
+        let most = arm.model.dry_friction(motion, self.memory);
         if arm.model.feels_joint_force {
             return self.with_joint_forces(arm, motion, net, most);
         }
@@ -532,7 +507,7 @@ impl<const N: usize> Rubbing<'_, N> {
             }
             let through = arm.through_joints(&response);
             *motion = motion.with_joint_force(&through);
-            most = dry_friction(&model.effects, motion, self.memory);
+            most = model.dry_friction(motion, self.memory);
             let missing = Joints::<f64, N>::from_fn(|j, _| self.way(j) * most[j] - slips[j]);
             let size = 1.0 + slips.amax();
             // A state that is not finite is reported elsewhere.

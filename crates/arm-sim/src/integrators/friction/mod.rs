@@ -12,10 +12,13 @@
 
 mod gain;
 mod growth;
+mod hold;
 mod instant;
 mod locate;
+mod steady;
 
 pub(crate) use instant::{Friction, at};
+pub(crate) use steady::steady;
 
 use core::cell::OnceCell;
 
@@ -69,12 +72,36 @@ fn step<const N: usize>(
         Integrator::SemiImplicitEuler => {
             implicit(model, (h, 1.0), [inputs.start, inputs.end], (state, memory));
         }
-        Integrator::Rk4 => switching(model, h, &inputs, (state, memory)),
+        Integrator::Rk4 => {
+            if !made_steadily(model, h, inputs, (state, memory)) {
+                switching(model, h, &inputs, (state, memory));
+            }
+        }
     }
 }
 
+/// Makes a step if no joint starts or ceases to slip in it; else the state stays.
+fn made_steadily<const N: usize>(
+    model: &Model<f64, N>,
+    h: f64,
+    inputs: Inputs<f64, N>,
+    (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
+) -> bool {
+    if !model.has_simple_friction() {
+        return false;
+    }
+    let before = *state;
+    memory.kept.copy_from_slice(&memory.state);
+    let made = steady(model, h, inputs, (state, memory)) > 0.0;
+    if !made {
+        *state = before;
+        memory.state.copy_from_slice(&memory.kept);
+    }
+    made
+}
+
 /// One step of Rk4 in as many parts as it has switches and one more.
-fn switching<const N: usize>(
+pub(crate) fn switching<const N: usize>(
     model: &Model<f64, N>,
     h: f64,
     inputs: &Inputs<f64, N>,
@@ -191,20 +218,16 @@ impl<const N: usize> Part<'_, N> {
         };
         let (mut begun, mut last) = (false, self.first.dry);
         let h = (to - self.from) * self.h;
-        rk4(
-            self.model,
-            (h, inputs),
-            (state, memory),
-            |input, q, qd, memory| {
-                if !begun {
-                    begun = true;
-                    return self.first.outcome;
-                }
-                let solved = Arm::at(self.model, input, (q, qd)).solve(memory, (&self.modes, None));
-                last = solved.dry;
-                solved.outcome
-            },
-        );
+        let evaluate = |input: &_, q: &_, qd: &_, memory: &_| {
+            if !begun {
+                begun = true;
+                return self.first.outcome;
+            }
+            let solved = Arm::at(self.model, input, (q, qd)).solve(memory, (&self.modes, None));
+            last = solved.dry;
+            solved.outcome
+        };
+        rk4(self.model, (h, inputs), (state, memory), evaluate);
         for joint in (0..N).filter(|&j| self.first.held[j]) {
             state.qd[joint] = 0.0;
         }
