@@ -1,8 +1,9 @@
-//! W2: one closed-chain run of 20 s at 0.25 ms. W3: a batch of runs of 2 s. Times are per step.
+//! W2: one closed-chain run of 20 s at 0.25 ms. W3: a batch of runs of 2 s. Both also with dry friction in each joint. Times are per step.
 
 use std::hint::black_box;
 
-use arm_sim::{Experiment, Integrator, sample_experiments, simulate, simulate_batch};
+use arm_core::effect::{Effect, Kind};
+use arm_sim::{Columns, Experiment, Integrator, sample_experiments, simulate, simulate_batch};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 fn w2(integrator: Integrator, output_interval: Option<f64>) -> Experiment<3> {
@@ -73,5 +74,34 @@ fn batch(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, single, batch);
+/// One run of 20 s, and 100 of them with masses that differ; friction is set-valued, or creeps below 0.01 rad/s.
+fn dry_friction(c: &mut Criterion) {
+    let mut group = c.benchmark_group("dry_friction");
+    group.sample_size(10);
+    for (name, smoothing) in [("set-valued", 0.0), ("creeping", 0.01)] {
+        let run = |i: u32| {
+            let mut run = w2(Integrator::Rk4, Some(0.02));
+            run.columns = Columns::Motion;
+            for segment in &mut run.setup.segments {
+                segment.mass *= 1.0 + 1e-3 * f64::from(i);
+            }
+            let coulomb = |j| Effect::new(Kind::Coulomb, j).with(&[0.1, smoothing]);
+            run.effects.extend((0..3).map(coulomb));
+            run
+        };
+        group.throughput(Throughput::Elements(80_000));
+        let alone = run(0);
+        group.bench_function(format!("{name}/single"), |b| {
+            b.iter(|| simulate(black_box(&alone)).expect("runs"));
+        });
+        let experiments: Vec<_> = (0..100).map(run).collect();
+        group.throughput(Throughput::Elements(8_000_000));
+        group.bench_function(format!("{name}/batch"), |b| {
+            b.iter(|| simulate_batch(black_box(&experiments), 1));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, single, batch, dry_friction);
 criterion_main!(benches);

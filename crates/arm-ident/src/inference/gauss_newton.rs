@@ -347,3 +347,99 @@ fn deviations<const N: usize>(fit: &[&Trial<N>], pieces: &[&Pieces]) -> Vec<Vec<
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::{Effect, Kind};
+    use arm_core::{Chain, Contact, Joints, Segment, sample_arms};
+
+    use super::*;
+    use crate::regression::trial::Tolerance;
+    use crate::regression::unknown::unknowns;
+
+    /// Two movements, the second with samples missing.
+    fn trials() -> [Trial<2>; 2] {
+        let wave = |i: i32, rate: f64| libm::sin(rate * f64::from(i));
+        [(0.021, 800), (0.034, 900)].map(|(rate, samples)| {
+            let q = (0..samples).map(|i| {
+                Joints::from([-1.0 + 0.5 * wave(i, rate), 0.9 + 0.4 * wave(i, 1.7 * rate)])
+            });
+            let mut trial = Trial {
+                force_on_arm: Some((0..samples).map(|i| [5.0 * wave(i, rate), 9.0]).collect()),
+                torque: Some(
+                    (0..samples)
+                        .map(|i| Joints::repeat(wave(i, 0.02)))
+                        .collect(),
+                ),
+                ..Trial::new(100.0, q.collect())
+            };
+            if samples > 800 {
+                trial.valid[400..430].fill(false);
+            }
+            trial
+        })
+    }
+
+    /// The mechanical arm with rotors, friction that sticks and springs with rest angles of their own; masses and linear parameters
+    /// grow with `part`.
+    fn estimated(part: f64) -> Model<2> {
+        let arm = sample_arms::mechanical_arm();
+        let segments = arm.segments().map(|s| Segment {
+            mass: s.mass * (0.5 + part),
+            ..s
+        });
+        let chain = Chain::new(segments, arm.base(), arm.gravity()).unwrap();
+        Model {
+            chain: chain.with_rotor_inertia([0.02, 0.01]).unwrap(),
+            segment_uncertainty: 0.1,
+            fitted: vec![
+                Effect::new(Kind::MotorInertia, 1).with(&[0.1 * part]),
+                Effect::new(Kind::Coulomb, 0).with(&[part, 0.0]),
+                Effect::new(Kind::Elastic, 0).with(&[part, -0.4 * part]),
+                Effect::new(Kind::Elastic, 1).with(&[2.0 * part, 0.7]),
+                Effect::new(Kind::Relaxation, 1).with(&[part]),
+            ],
+            held: vec![Effect::new(Kind::Thixotropy, 1).with(&[0.2, 0.0, 0.0, 0.1, 3.0, 0.0])],
+            contact: Contact::new([1e4; 2], [25.0; 2]),
+        }
+    }
+
+    #[test]
+    fn a_later_round_has_the_rows_of_a_whole_preparation() {
+        let (trials, [first, later]) = (trials(), [0.3, 0.7].map(estimated));
+        let tolerance = Tolerance {
+            angle_offset_deg: 1.0,
+            ..Tolerance::default()
+        };
+        let fit: Vec<_> = trials.iter().collect();
+        let unknowns = unknowns(&first, &tolerance, &fit);
+        let how = (3.0, false, 0.0, None);
+        let of = |model, wanted: &[bool]| {
+            prepare((model, &unknowns, wanted), &trials, how, 1).expect("rows")
+        };
+        let all = vec![true; unknowns.len()];
+        let follow: Vec<bool> = unknowns
+            .iter()
+            .map(|u| follows_estimate(&first, u))
+            .collect();
+        assert!(follow.contains(&true) && follow.contains(&false));
+
+        let (before, whole) = (of(&first, &all), of(&later, &all));
+        let mut renewed = before.clone();
+        make_room(&mut renewed, &follow);
+        renew(&mut renewed, of(&later, &follow), &follow);
+
+        let rows = |pieces: &[Pieces]| -> Vec<_> {
+            let rows = pieces.iter().flatten();
+            rows.map(|r| (r.columns.clone(), r.rhs.clone(), r.held.clone()))
+                .collect()
+        };
+        assert_eq!(rows(&renewed), rows(&whole));
+        assert_ne!(rows(&before), rows(&whole));
+        assert!(
+            whole.iter().flatten().count() > trials.len(),
+            "a gap divides"
+        );
+        assert!(whole.iter().flatten().all(|rows| rows.held.is_some()));
+    }
+}

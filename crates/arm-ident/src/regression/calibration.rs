@@ -225,3 +225,51 @@ fn resistance_by_angle<const N: usize>(
     }
     slopes
 }
+
+#[cfg(test)]
+mod tests {
+    use arm_core::effect::{ActsOn, KINDS};
+
+    use super::*;
+
+    /// Every kind, where it can stand in three joints, against differences of all torques to all angles.
+    #[test]
+    fn resistance_changes_with_no_angle_but_those_looked_at() {
+        const STEP: f64 = 1e-4;
+        let mut motion = Motion::<f64, 3>::new(
+            0.7,
+            Joints::<f64, 3>::new(-1.1, 1.9, 0.4),
+            Joints::<f64, 3>::new(0.6, -0.8, 0.3),
+        );
+        motion.activity = [0.2, 0.4, 0.6];
+        let memory = [[0.1, 0.2, 0.3]];
+        let mut depend = 0;
+        for &kind in KINDS.iter().filter(|k| k.acts_on() == ActsOn::Joints) {
+            for joint in usize::from(kind.crosses())..3 {
+                let mut effect = Effect::new(kind, joint);
+                for (value, p) in effect.parameters.iter_mut().zip(kind.info().parameters) {
+                    if p.linear {
+                        *value = 0.5f64.clamp(p.min, p.max);
+                    }
+                }
+                let effects = [effect];
+                let found = resistance_by_angle(&effects, &motion, &memory);
+                for angle in 0..3 {
+                    let [up, down] = [STEP, -STEP].map(|step| {
+                        let mut moved = motion;
+                        moved.q[angle] += step;
+                        resisting_torque(&effects, &moved, &memory)
+                    });
+                    let expected = (up - down) / (2.0 * STEP);
+                    let off = (found.column(angle) - expected).amax();
+                    assert!(
+                        off <= 1e-6 * (1.0 + expected.amax()),
+                        "{kind:?} in joint {joint}, angle {angle}: {off}"
+                    );
+                    depend += usize::from(expected.amax() > 0.0);
+                }
+            }
+        }
+        assert!(depend > 20, "{depend}");
+    }
+}
