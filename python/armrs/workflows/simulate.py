@@ -275,10 +275,10 @@ def runaway(pieces: Iterable[Simulated]) -> tuple[str, ...]:
     """Return a line where a joint turns faster than a led arm does."""
     fastest, first = 0.0, None
     for piece in pieces:
-        speed = np.abs(piece.qd).max(axis=1)
+        speed = np.abs(piece.qd)
         fastest = max(fastest, float(speed.max()))
         if first is None and fastest > RUNAWAY:
-            first = piece.t[np.argmax(speed > RUNAWAY)]
+            first = piece.t[np.argmax((speed > RUNAWAY).any(axis=1))]
     if first is None:
         return ()
     return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)

@@ -25,6 +25,7 @@ use core::cell::OnceCell;
 use arm_core::Joints;
 use instant::{Arm, Mode, Modes, Solved};
 use locate::{LOCATED, first_beyond};
+use steady::STILL;
 
 use crate::closed_chain::model::{Link, Model};
 use crate::closed_chain::state::{BaseMotion, Input, State};
@@ -40,8 +41,6 @@ const MOST_SWITCHES: usize = 12;
 const RESOLVED: f64 = 0.3;
 /// Shortest part of a step that is made for that, as a fraction of the step.
 const SHORTEST: f64 = 1.0 / 128.0;
-/// Speed against the friction that is rounding \[rad/s\].
-const STILL: f64 = 1e-13;
 
 /// Advances a state by one step of length `h`, with dry friction where there is any.
 #[inline(always)]

@@ -6,12 +6,14 @@ use arm_core::effect::States;
 use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Joints, Pose, Resistance, Scalar};
 
-use super::STILL;
 use super::hold::hold;
 use super::instant::ROUNDING;
 use crate::closed_chain::model::Model;
 use crate::closed_chain::state::{Input, Outcome, State, difference, powers, sum};
 use crate::integrators::step::{Inputs, Memory, rk4};
+
+/// Speed against the friction that is rounding \[rad/s\].
+pub(super) const STILL: f64 = 1e-13;
 
 /// Makes a step of Rk4 for a rig with [simple friction](Model::has_simple_friction) if its joints slip or stick in it as they do at its start.
 ///
