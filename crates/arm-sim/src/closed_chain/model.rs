@@ -41,7 +41,7 @@ pub(crate) struct Model<T, const N: usize> {
     pub effects: Vec<Effect<T>>,
     /// Sums over those that are linear in the motion of their joint: constant, to the angle, to the speed.
     affine: [[T; 3]; N],
-    /// All again with those switched off; empty where none is left.
+    /// The others; where one of them has states, all again with those of the sums switched off.
     others: Vec<Effect<T>>,
     /// Whether one of those resists with more than set-valued dry friction.
     resists_otherwise: bool,
@@ -83,8 +83,9 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 effect.on = false;
             }
         }
-        if others.iter().all(|effect| !effect.on) {
-            others.clear();
+        // The place of an effect in the list says which states it has, and nothing where there are none.
+        if !any_state(&others) {
+            others.retain(|effect| effect.on);
         }
         let is_dry = |e: &&Effect<T>| has_dry_friction(e);
         let mut dry = [false; N];
