@@ -74,11 +74,11 @@ fn batch(c: &mut Criterion) {
     group.finish();
 }
 
-/// One run of 20 s, and 100 of them with masses that differ; friction is set-valued, or creeps below 0.01 rad/s.
+/// One run of 20 s, and 100 of them with masses that differ; friction is set-valued (`smoothing` 0) or smooth (0.01 rad/s).
 fn dry_friction(c: &mut Criterion) {
     let mut group = c.benchmark_group("dry_friction");
     group.sample_size(10);
-    for (name, smoothing) in [("set-valued", 0.0), ("creeping", 0.01)] {
+    for (name, smoothing) in [("set-valued", 0.0), ("smooth", 0.01)] {
         let run = |i: u32| {
             let mut run = w2(Integrator::Rk4, Some(0.02));
             run.columns = Columns::Motion;

@@ -34,7 +34,7 @@ fn main() {
         "step_euler" => run(amount, Integrator::SemiImplicitEuler, &[]),
         "step_fourth_order" => run(amount, Integrator::Rk4, &[]),
         "step_friction" => run(amount, Integrator::Rk4, &friction(0.0)),
-        "step_creep" => run(amount, Integrator::Rk4, &friction(0.01)),
+        "step_smooth_friction" => run(amount, Integrator::Rk4, &friction(0.01)),
         "gap_session" => gap(amount),
         other => panic!("{other}: nothing that is counted"),
     }
@@ -51,7 +51,7 @@ fn kernel(calls: u32, call: impl Fn(&[Joints<f64, 3>; 3]) -> f64) {
     }
 }
 
-/// Dry friction in every joint: set-valued, or creeping below a speed \[rad/s\].
+/// Dry friction in every joint with a smoothing \[rad/s\], for 0 set-valued.
 fn friction(smoothing: f64) -> Vec<Effect<f64>> {
     let coulomb = |joint| Effect::new(Kind::Coulomb, joint).with(&[0.1, smoothing]);
     (0..3).map(coulomb).collect()

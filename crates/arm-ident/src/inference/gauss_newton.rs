@@ -380,8 +380,8 @@ mod tests {
         })
     }
 
-    /// The mechanical arm with rotors, friction that sticks and springs with rest angles of their own; masses and linear parameters
-    /// grow with `part`.
+    /// The mechanical arm with rotors, friction that sticks and springs with different rest angles; masses and most fitted parameters grow
+    /// with `part`.
     fn estimated(part: f64) -> Model<2> {
         let arm = sample_arms::mechanical_arm();
         let segments = arm.segments().map(|s| Segment {
@@ -405,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn a_later_round_has_the_rows_of_a_whole_preparation() {
+    fn renewed_rows_are_those_of_a_whole_preparation() {
         let (trials, [first, later]) = (trials(), [0.3, 0.7].map(estimated));
         let tolerance = Tolerance {
             angle_offset_deg: 1.0,

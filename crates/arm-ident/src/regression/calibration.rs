@@ -232,9 +232,9 @@ mod tests {
 
     use super::*;
 
-    /// Every kind, where it can stand in three joints, against differences of all torques to all angles.
+    /// Every kind in every joint of three where it can be, against finite differences of all torques with respect to all angles.
     #[test]
-    fn resistance_changes_with_no_angle_but_those_looked_at() {
+    fn resistance_by_angle_agrees_with_differences_for_every_angle() {
         const STEP: f64 = 1e-4;
         let mut motion = Motion::<f64, 3>::new(
             0.7,

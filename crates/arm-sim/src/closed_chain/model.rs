@@ -41,7 +41,8 @@ pub(crate) struct Model<T, const N: usize> {
     pub effects: Vec<Effect<T>>,
     /// Sums over those that are linear in the motion of their joint: constant, to the angle, to the speed.
     affine: [[T; 3]; N],
-    /// The others; where one of them has states, all again with those of the sums switched off.
+    /// Effects that are not in the sums. If one of them has states, the full list with the summed effects switched off: an index selects
+    /// the states.
     others: Vec<Effect<T>>,
     /// Whether one of those resists with more than set-valued dry friction.
     resists_otherwise: bool,
@@ -55,7 +56,7 @@ pub(crate) struct Model<T, const N: usize> {
     pub has_dry: bool,
     /// Whether some of it depends on speed.
     pub dry_falls: bool,
-    /// Its largest torque in each joint, where nothing changes that.
+    /// Largest torque of it in each joint, where that is constant \[N m\].
     constant_dry: Option<[T; N]>,
     pub products: Products<T, N>,
     /// Whether an effect depends on states of its own.
@@ -83,7 +84,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
                 effect.on = false;
             }
         }
-        // The place of an effect in the list says which states it has, and nothing where there are none.
+        // An effect's index selects its states, so the list may be shortened only if no effect has any.
         if !any_state(&others) {
             others.retain(|effect| effect.on);
         }
@@ -141,8 +142,8 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         !self.has_dry && !has_play && self.others.is_empty()
     }
 
-    /// Whether neither the speed of a joint nor the force through it changes its dry friction, and nothing but that holds joints: then
-    /// [`steady`](crate::integrators::friction::steady) makes most steps.
+    /// Whether set-valued friction is independent of speed, no effect depends on the force through a joint, and neither a rigid coupling nor
+    /// a moving base adds constraints: then [`steady`](crate::integrators::friction::steady) makes most steps.
     #[inline]
     pub fn has_simple_friction(&self) -> bool {
         self.has_dry && !self.dry_falls && !self.feels_joint_force && self.in_link_form()
@@ -343,7 +344,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         }
     }
 
-    /// Velocity of what the force on the arm acts between: the handle, or the tip where the force is given \[m/s\].
+    /// Velocity with which the force on the arm does work: that of the handle, or of the tip where the force is given \[m/s\].
     #[inline(always)]
     pub fn velocity_of_force(
         &self,

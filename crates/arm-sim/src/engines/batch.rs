@@ -96,7 +96,7 @@ fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcome
     outcomes
 }
 
-/// Whether a run may run beside others: with dry friction if most steps need no switch. Semi-implicit Euler looks for switches in each.
+/// Whether a run may share lanes: with set-valued friction only if that is simple, and by Rk4.
 fn may_be_beside<const N: usize>(run: &Prepared<N>) -> bool {
     let is_simple = || run.integrator() == Integrator::Rk4 && run.model.has_simple_friction();
     !run.model.has_dry || is_simple()
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_with_dry_friction_that_reverse_at_times_of_their_own() {
+    fn runs_with_dry_friction_that_reverse_at_different_times() {
         let coulomb = |joint, torque: f64, smoothing: f64| {
             Effect::new(Kind::Coulomb, joint).with(&[torque, smoothing])
         };
@@ -286,7 +286,7 @@ mod tests {
             run.effects = vec![
                 Effect::new(Kind::Viscous, 1).with(&[viscosity]),
                 coulomb(0, 0.1 + 0.02 * i as f64, 0.0),
-                // Of another kind of step, or without friction in this joint.
+                // Runs 13 and 30 have set-valued friction in other joints than their neighbours, run 40 has friction that falls with speed.
                 coulomb(1, if i == 13 { 0.0 } else { 0.2 }, 0.0),
                 coulomb(2, 0.05, if i == 30 { 0.01 } else { 0.0 }),
                 spring,

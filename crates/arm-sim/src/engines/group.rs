@@ -46,7 +46,7 @@ pub(super) struct Group<'a, 'b, const L: usize, const N: usize> {
     /// Room for the states of effects in one lane.
     alone: Memory<f64>,
     row: Row<Lanes<L>>,
-    /// Room for an instant of one lane.
+    /// Room for one recorded row of one lane.
     row_alone: Row<f64>,
     recorders: Vec<Recorder<'b, 'static, N>>,
     /// Why a run stopped early.
@@ -268,7 +268,7 @@ impl<'a, const L: usize, const N: usize> Steps<'a, L, N> {
         }
     }
 
-    /// A step with dry friction: of all lanes together where no joint starts or ceases to slip, by itself of each other one.
+    /// A step with dry friction: of all lanes together, and again one by one of those in which a joint starts or stops slipping.
     #[inline(always)]
     fn step_with_friction(
         &self,

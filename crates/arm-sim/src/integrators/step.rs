@@ -86,7 +86,7 @@ pub(crate) fn step<T: Scalar, const N: usize>(
     match integrator {
         Integrator::SemiImplicitEuler => semi_implicit_euler(model, h, inputs, state, memory),
         Integrator::Rk4 => {
-            // Every stage by a call of its own, not four times in one piece of code.
+            // Each stage is a separate call, so that its code is not inlined four times.
             let evaluate = |input: &_, q: &_, qd: &_, memory: &_| {
                 let moving = (q, qd);
                 dispatch(Stage {
@@ -104,7 +104,7 @@ pub(crate) fn step<T: Scalar, const N: usize>(
     }
 }
 
-/// What follows at a stage of a step.
+/// Evaluates the model at one stage.
 struct Stage<'a, T, const N: usize> {
     model: &'a Model<T, N>,
     input: &'a Input<T, N>,

@@ -5,12 +5,12 @@ use arm_core::{Joints, Scalar};
 /// Share of its own inverse inertia below which what a joint gives to a torque of its friction is rounding.
 const STIFF: f64 = 1e-9;
 
-/// Torques that take acceleration from joints that stick \[N m\], and 1 for each of these joints that they hold, else 0: not one that
-/// nothing but the handle moves.
+/// Friction torques that cancel the accelerations of joints that stick \[N m\], and 1 for each joint that they hold, else 0: a joint whose
+/// motion the handle prescribes is not held.
 ///
 /// * `columns` - accelerations for one newton metre in each joint that sticks \[rad/(s² N m)\]
-/// * `own` - what that joint would give way by if nothing held the tip \[rad/(s² N m)\]
-/// * `left` - the acceleration to take from each joint that sticks \[rad/s²\]
+/// * `own` - acceleration of that joint for one newton metre in it with the tip free \[rad/(s² N m)\]
+/// * `left` - the acceleration to cancel in each joint that sticks \[rad/s²\]
 /// * `sticks` - 1 for a joint that sticks, else 0
 #[inline(always)]
 pub(super) fn hold<T: Scalar, const N: usize>(

@@ -79,7 +79,7 @@ fn step<const N: usize>(
     }
 }
 
-/// Makes a step if no joint starts or ceases to slip in it; else the state stays.
+/// Makes a step if no joint starts or stops slipping in it; else leaves the state as it is and returns false.
 fn made_steadily<const N: usize>(
     model: &Model<f64, N>,
     h: f64,

@@ -1,4 +1,4 @@
-//! Steps in which no joint starts or ceases to slip, of one run or of several in lanes.
+//! Steps in which no joint starts or stops slipping, of one run or of several in lanes.
 
 use core::array::from_fn;
 
@@ -12,13 +12,13 @@ use crate::closed_chain::model::Model;
 use crate::closed_chain::state::{Input, Outcome, State, difference, powers, sum};
 use crate::integrators::step::{Inputs, Memory, rk4};
 
-/// Speed against the friction that is rounding \[rad/s\].
+/// Speed against the direction of slip that is rounding \[rad/s\].
 pub(super) const STILL: f64 = 1e-13;
 
-/// Makes a step of Rk4 for a rig with [simple friction](Model::has_simple_friction) if its joints slip or stick in it as they do at its start.
+/// Makes a step of Rk4 for a rig with [simple friction](Model::has_simple_friction) if no joint changes between slipping and sticking.
 ///
 /// Returns 1 where it is made, with the bits of a step that looks for switches and finds none, and −1 where it is not: there the
-/// state is of no use, and the step has to be made again from the state before.
+/// state is invalid, and the step has to be repeated from the state before.
 #[inline(always)]
 pub(crate) fn steady<T: Scalar, const N: usize>(
     model: &Model<T, N>,
@@ -27,7 +27,7 @@ pub(crate) fn steady<T: Scalar, const N: usize>(
     (state, memory): (&mut State<T, N>, &mut Memory<T>),
 ) -> T {
     let mut rig = Steady::new(model, &state.qd);
-    // Every stage by a call of its own, not four times in one piece of code.
+    // Each stage is a separate call, so that its code is not inlined four times.
     let evaluate = |input: &_, q: &_, qd: &_, memory: &_| {
         let rig = &mut rig;
         let moving = (q, qd);
@@ -42,7 +42,7 @@ pub(crate) fn steady<T: Scalar, const N: usize>(
     rig.settle(&mut state.qd)
 }
 
-/// A rig whose joints go on slipping or sticking as they do.
+/// A rig with the modes of its joints fixed for one step.
 struct Steady<'a, T, const N: usize> {
     model: &'a Model<T, N>,
     /// Direction in which a joint slips, 1 or −1; else 0.
@@ -59,13 +59,11 @@ struct Steady<'a, T, const N: usize> {
 impl<'a, T: Scalar, const N: usize> Steady<'a, T, N> {
     #[inline(always)]
     fn new(model: &'a Model<T, N>, qd: &Joints<T, N>) -> Self {
-        // What is less than this is zero.
-        let least = T::of(f64::from_bits(1));
         let (mut ways, mut sticks) = (Joints::<T, N>::repeat(T::ZERO), [T::ZERO; N]);
         for j in 0..N {
             if model.dry[j] {
                 let way = T::if_less(qd[j], T::ZERO, -T::ONE, T::ONE);
-                sticks[j] = T::if_less(qd[j].abs(), least, T::ONE, T::ZERO);
+                sticks[j] = T::if_less(T::ZERO, qd[j].abs(), T::ZERO, T::ONE);
                 ways[j] = T::if_less(T::ZERO, sticks[j], T::ZERO, way);
             }
         }
@@ -81,7 +79,7 @@ impl<'a, T: Scalar, const N: usize> Steady<'a, T, N> {
         }
     }
 
-    /// Dry friction of joints that stick, which changes their accelerations to zero \[N m\].
+    /// Dry friction of joints that stick, which cancels their accelerations \[N m\].
     ///
     /// * `most` - what it can be at most \[N m\]
     #[inline(always)]
@@ -107,7 +105,7 @@ impl<'a, T: Scalar, const N: usize> Steady<'a, T, N> {
         for j in 0..N {
             qdd[j] = T::if_less(T::ZERO, held[j], T::ZERO, qdd[j]);
         }
-        // Between its ends a step is not looked at.
+        // The limit of friction is checked at the start and at the end of the step only.
         if self.stage == 0 || self.stage == 3 {
             for j in 0..N {
                 let size = torque[j].abs();
@@ -121,7 +119,7 @@ impl<'a, T: Scalar, const N: usize> Steady<'a, T, N> {
         torque
     }
 
-    /// Ends the step: speeds that reached zero are exactly that.
+    /// Ends the step: speeds that rounding carried past zero, and those of joints that stick, are zero.
     #[inline(always)]
     fn settle(&self, qd: &mut Joints<T, N>) -> T {
         let mut made = self.made;
@@ -138,7 +136,7 @@ impl<'a, T: Scalar, const N: usize> Steady<'a, T, N> {
     }
 }
 
-/// What follows at a stage of the step.
+/// Evaluates the rig at one stage.
 struct Stage<'a, 'b, T, const N: usize> {
     rig: &'a mut Steady<'b, T, N>,
     input: &'a Input<T, N>,
