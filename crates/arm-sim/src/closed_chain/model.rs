@@ -101,7 +101,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         let resists = |e: &Effect<T>| e.on && (!has_dry || resists_besides_dry(e));
         let is_constant = effects
             .iter()
-            .filter(is_dry)
+            .filter(|effect| effect.is_dry())
             .all(|effect| effect.kind.is_rate_independent());
         let zero = Joints::<T, N>::repeat(T::ZERO);
         let at_rest = || dry_friction(&effects, &Motion::new(T::ZERO, zero, zero), &[]);

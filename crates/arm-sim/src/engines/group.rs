@@ -182,11 +182,18 @@ impl<'a, 'b, const L: usize, const N: usize> Group<'a, 'b, L, N> {
 
     /// One step of each run by itself.
     pub fn step_apart(&mut self, number: usize) {
+        let (before, memory) = (self.state, &mut self.memory);
+        memory.kept.copy_from_slice(&memory.state);
         for i in 0..L {
-            let at = (&mut self.state, &mut self.memory);
-            step_lane(i, at, &mut self.alone, |at| {
-                step_in_pieces(in_lane(self.prepared, i), number, at);
-            });
+            step_lane(
+                i,
+                &before,
+                (&mut self.state, memory),
+                &mut self.alone,
+                |at| {
+                    step_in_pieces(in_lane(self.prepared, i), number, at);
+                },
+            );
         }
         self.stop_diverged(number);
     }
@@ -224,17 +231,18 @@ fn copy_lane<const L: usize>(lane: usize, all: &[States<Lanes<L>>], one: &mut [S
     }
 }
 
-/// Makes a step of one lane by itself.
+/// Makes a step of one lane by itself, from the state before the step; the states of effects before it are kept in `memory`.
 ///
 /// * `alone` - room for its states of effects
 fn step_lane<const L: usize, const N: usize>(
     lane: usize,
+    before: &State<Lanes<L>, N>,
     (state, memory): (&mut State<Lanes<L>, N>, &mut Memory<Lanes<L>>),
     alone: &mut Memory<f64>,
     step: impl FnOnce((&mut State<f64, N>, &mut Memory<f64>)),
 ) {
-    let mut one = state.lane(lane);
-    copy_lane(lane, &memory.state, &mut alone.state);
+    let mut one = before.lane(lane);
+    copy_lane(lane, &memory.kept, &mut alone.state);
     step((&mut one, alone));
     state.set_lane(lane, &one);
     let states = memory.state.as_flattened_mut().iter_mut();
@@ -283,12 +291,6 @@ impl<'a, const L: usize, const N: usize> Steps<'a, L, N> {
             return;
         }
         for i in (0..L).filter(|&i| made.0[i] < 0.0) {
-            state.set_lane(i, &before.lane(i));
-            for (all, kept) in memory.state.iter_mut().zip(&memory.kept) {
-                for (all, kept) in all.iter_mut().zip(kept) {
-                    all.0[i] = kept.0[i];
-                }
-            }
             let [start, middle, end] =
                 [inputs.start, inputs.middle, inputs.end].map(|input| input.lane(i));
             let inputs = Inputs {
@@ -296,7 +298,7 @@ impl<'a, const L: usize, const N: usize> Steps<'a, L, N> {
                 middle: &middle,
                 end: &end,
             };
-            step_lane(i, (state, memory), alone, |at| {
+            step_lane(i, &before, (state, memory), alone, |at| {
                 switching(&in_lane(self.runs, i).model, self.h, &inputs, at);
             });
         }

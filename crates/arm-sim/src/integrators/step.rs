@@ -85,40 +85,69 @@ pub(crate) fn step<T: Scalar, const N: usize>(
 ) {
     match integrator {
         Integrator::SemiImplicitEuler => semi_implicit_euler(model, h, inputs, state, memory),
-        Integrator::Rk4 => {
-            // Each stage is a separate call, so that its code is not inlined four times.
-            let evaluate = |input: &_, q: &_, qd: &_, memory: &_| {
-                let moving = (q, qd);
-                dispatch(Stage {
-                    model,
-                    input,
-                    moving,
-                    memory,
-                })
-            };
-            rk4(model, (h, inputs), (state, memory), evaluate);
-        }
+        Integrator::Rk4 => rk4_by_calls(model, (h, inputs), (state, memory), &mut { model }),
     }
     if matches!(model.link, Link::Rigid) {
         model.project(inputs.end, state, (PROJECTIONS, &[false; N]));
     }
 }
 
-/// Evaluates the model at one stage.
-struct Stage<'a, T, const N: usize> {
-    model: &'a Model<T, N>,
+/// What a stage of [`rk4_by_calls`] is evaluated with.
+pub(crate) trait Evaluate<T, const N: usize> {
+    /// What follows from input, angles and speeds, and states of effects; called for each stage in order.
+    fn evaluate(
+        &mut self,
+        input: &Input<T, N>,
+        moving: (&Joints<T, N>, &Joints<T, N>),
+        memory: &[States<T>],
+    ) -> Outcome<T, N>;
+}
+
+impl<T: Scalar, const N: usize> Evaluate<T, N> for &Model<T, N> {
+    #[inline(always)]
+    fn evaluate(
+        &mut self,
+        input: &Input<T, N>,
+        (q, qd): (&Joints<T, N>, &Joints<T, N>),
+        memory: &[States<T>],
+    ) -> Outcome<T, N> {
+        Model::evaluate(self, input, q, qd, memory)
+    }
+}
+
+/// [`rk4`] with a separate call for each stage, for the vectors of this processor: its code is not inlined four times.
+#[inline(always)]
+pub(crate) fn rk4_by_calls<T: Scalar, const N: usize>(
+    model: &Model<T, N>,
+    how: (f64, Inputs<T, N>),
+    at: (&mut State<T, N>, &mut Memory<T>),
+    rig: &mut impl Evaluate<T, N>,
+) {
+    rk4(model, how, at, |input, q, qd, memory| {
+        let (rig, moving) = (&mut *rig, (q, qd));
+        dispatch(Stage {
+            rig,
+            input,
+            moving,
+            memory,
+        })
+    });
+}
+
+/// One stage.
+struct Stage<'a, E, T, const N: usize> {
+    rig: &'a mut E,
     input: &'a Input<T, N>,
     moving: (&'a Joints<T, N>, &'a Joints<T, N>),
     memory: &'a [States<T>],
 }
 
-impl<T: Scalar, const N: usize> Computation for Stage<'_, T, N> {
+impl<T: Scalar, E: Evaluate<T, N>, const N: usize> Computation for Stage<'_, E, T, N> {
     type Output = Outcome<T, N>;
 
     #[inline(always)]
     fn call(self) -> Outcome<T, N> {
-        let (q, qd) = self.moving;
-        self.model.evaluate(self.input, q, qd, self.memory)
+        self.rig.evaluate(self.input, self.moving, self.memory)
     }
 }
 

@@ -1,6 +1,5 @@
 //! The initial state of a run.
 
-use arm_core::effect::dry_friction;
 use arm_core::{Contact, Joints, Pose};
 
 use crate::SimulationError;
@@ -188,7 +187,7 @@ fn most_friction<const N: usize>(
     let force = force(model, input, (x, &q, &pose));
     let through = model.through_joints(&pose, (&rest, &rest), (force, input));
     let motion = input.motion(&q, &rest).with_joint_force(&through);
-    dry_friction(&model.effects, &motion, &[])
+    model.dry_friction(&motion, &[])
 }
 
 /// The equilibrium of the joints that friction does not hold where they are given.

@@ -6,7 +6,7 @@
 
 use core::array::from_fn;
 
-use arm_core::effect::{MAX_STATES, Motion, States, dry_friction};
+use arm_core::effect::{MAX_STATES, Motion, States};
 use arm_core::{Contact, Joints, Plane, Pose, joint_force};
 
 use super::settings::RapierSettings;
@@ -178,7 +178,7 @@ impl<'a, const N: usize> Arm<'a, N> {
         /// How much faster a joint that keeps its direction is than what a step, or friction in it, changes of its speed.
         const CERTAIN: f64 = 4.0;
         let inertia = |i: usize| self.model.chain.segments()[i].inertia;
-        let most = dry_friction(&self.model.effects, motion, &self.memory);
+        let most = self.model.dry_friction(motion, &self.memory);
         let (mut torque, mut sticky) = (Joints::zeros(), Joints::zeros());
         for j in (0..N).filter(|&j| self.model.dry[j]) {
             let (speed, change) = (self.before.joints[j], self.reaction.change[j]);

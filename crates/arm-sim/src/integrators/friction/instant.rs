@@ -55,7 +55,7 @@ impl<T: Scalar, const N: usize> Friction<T, N> {
 }
 
 /// Share by which a torque may exceed the largest friction by rounding.
-pub(super) const ROUNDING: f64 = 1e-10;
+const ROUNDING: f64 = 1e-10;
 /// Speed of a rigidly led joint that is rounding \[rad/s\].
 const LED_STILL: f64 = 1e-9;
 /// Acceleration of a rigidly led joint that is rounding \[rad/s²\].
@@ -82,13 +82,11 @@ pub(crate) fn at<const N: usize>(
 }
 
 /// How far what holds a joint is from the most that it can be, as a share of that.
-pub(crate) fn reserve<const N: usize>(dry: &Friction<f64, N>, joint: usize) -> f64 {
+#[inline(always)]
+pub(crate) fn reserve<T: Scalar, const N: usize>(dry: &Friction<T, N>, joint: usize) -> T {
     let (most, held) = (dry.most[joint], dry.torque[joint].abs());
-    if most > 0.0 {
-        1.0 + ROUNDING - held / most
-    } else {
-        -held
-    }
+    let share = || T::ONE + T::of(ROUNDING) - held / most;
+    T::where_less(T::ZERO, most, share, || -held)
 }
 
 /// Derivative of a joint's friction to the force through it \[m\].

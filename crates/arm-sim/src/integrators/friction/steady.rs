@@ -3,14 +3,13 @@
 use core::array::from_fn;
 
 use arm_core::effect::States;
-use arm_core::simd_dispatch::{Computation, dispatch};
 use arm_core::{Joints, Pose, Resistance, Scalar};
 
 use super::hold::hold;
-use super::instant::ROUNDING;
+use super::instant::{Friction, reserve};
 use crate::closed_chain::model::Model;
 use crate::closed_chain::state::{Input, Outcome, State, difference, powers, sum};
-use crate::integrators::step::{Inputs, Memory, rk4};
+use crate::integrators::step::{Evaluate, Inputs, Memory, rk4_by_calls};
 
 /// Speed against the direction of slip that is rounding \[rad/s\].
 pub(super) const STILL: f64 = 1e-13;
@@ -27,18 +26,7 @@ pub(crate) fn steady<T: Scalar, const N: usize>(
     (state, memory): (&mut State<T, N>, &mut Memory<T>),
 ) -> T {
     let mut rig = Steady::new(model, &state.qd);
-    // Each stage is a separate call, so that its code is not inlined four times.
-    let evaluate = |input: &_, q: &_, qd: &_, memory: &_| {
-        let rig = &mut rig;
-        let moving = (q, qd);
-        dispatch(Stage {
-            rig,
-            input,
-            moving,
-            memory,
-        })
-    };
-    rk4(model, (h, inputs), (state, memory), evaluate);
+    rk4_by_calls(model, (h, inputs), (state, memory), &mut rig);
     rig.settle(&mut state.qd)
 }
 
@@ -107,11 +95,10 @@ impl<'a, T: Scalar, const N: usize> Steady<'a, T, N> {
         }
         // The limit of friction is checked at the start and at the end of the step only.
         if self.stage == 0 || self.stage == 3 {
+            let most = *most;
+            let friction = Friction { torque, most };
             for j in 0..N {
-                let size = torque[j].abs();
-                let share = T::ONE + T::of(ROUNDING) - size / most[j];
-                let reserve = T::if_less(T::ZERO, most[j], share, -size);
-                let beyond = T::if_less(reserve, T::ZERO, -T::ONE, self.made);
+                let beyond = T::if_less(reserve(&friction, j), T::ZERO, -T::ONE, self.made);
                 let made = T::if_less(T::ZERO, held[j], beyond, -T::ONE);
                 self.made = T::if_less(T::ZERO, self.sticks[j], made, self.made);
             }
@@ -136,33 +123,22 @@ impl<'a, T: Scalar, const N: usize> Steady<'a, T, N> {
     }
 }
 
-/// Evaluates the rig at one stage.
-struct Stage<'a, 'b, T, const N: usize> {
-    rig: &'a mut Steady<'b, T, N>,
-    input: &'a Input<T, N>,
-    moving: (&'a Joints<T, N>, &'a Joints<T, N>),
-    memory: &'a [States<T>],
-}
-
-impl<T: Scalar, const N: usize> Computation for Stage<'_, '_, T, N> {
-    type Output = Outcome<T, N>;
-
+impl<T: Scalar, const N: usize> Evaluate<T, N> for Steady<'_, T, N> {
     #[inline(always)]
-    fn call(self) -> Outcome<T, N> {
-        let Self {
-            rig,
-            input,
-            moving: (q, qd),
-            memory,
-        } = self;
-        let model = rig.model;
+    fn evaluate(
+        &mut self,
+        input: &Input<T, N>,
+        (q, qd): (&Joints<T, N>, &Joints<T, N>),
+        memory: &[States<T>],
+    ) -> Outcome<T, N> {
+        let model = self.model;
         let pose = Pose::new(q);
         let motion = input.motion(q, qd);
         let resisting = model.resisting(&motion, memory);
         let most = model.dry_friction(&motion, memory);
-        let mut dry = rig.ways;
+        let mut dry = self.ways;
         for j in 0..N {
-            dry[j] = rig.ways[j] * most[j];
+            dry[j] = self.ways[j] * most[j];
         }
         let (force, lost) = model.contact(input, q, qd, &pose);
         let driving = model.driving(input, &pose);
@@ -170,10 +146,10 @@ impl<T: Scalar, const N: usize> Computation for Stage<'_, '_, T, N> {
         let load = model.load(&pose, &net, force);
         let resistance = Resistance::at(&model.products, &pose, qd);
         let mut qdd = resistance.accelerations(&model.products, &pose, &load);
-        if rig.any_sticks {
-            dry = sum(&rig.hold(&resistance, &mut qdd, &most), &dry);
+        if self.any_sticks {
+            dry = sum(&self.hold(&resistance, &mut qdd, &most), &dry);
         }
-        rig.stage += 1;
+        self.stage += 1;
         let v = model.velocity_of_force(input, qd, &pose);
         Outcome {
             qdd,
