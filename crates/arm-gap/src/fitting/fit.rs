@@ -1,4 +1,4 @@
-//! Fit of a hypothesis to the fit trials by Gauss and Newton's method, damped where necessary.
+//! Fit of a hypothesis to the fit trials by Gauss and Newton's method, within a region in which its linear model is trusted.
 
 use arm_numerics::Matrix;
 
@@ -14,9 +14,13 @@ use crate::sensitivity::rows::Columns;
 
 /// Most steps of a fit.
 const STEPS: usize = 6;
-/// Damping of the steps that are tried, as a share of the diagonal of the normal equations (Levenberg and Marquardt): what the data
-/// decide well moves on where a whole step leads astray.
-const DAMPING: [f64; 7] = [0.0, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
+/// Damping of steps as a share of the diagonal of the normal equations (Levenberg and Marquardt): what the data decide well moves on
+/// where a whole step leads astray.
+const DAMPING: [f64; 16] = [
+    0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0,
+];
+/// Steps that are tried from one place, each shorter than the one before.
+const TRIES: usize = 5;
 /// A step that gains less than this, in units of the noise, is the last,
 const ENOUGH: f64 = 0.2;
 /// and where the model is far from the data, less than this share of what the cost exceeds the number of rows by.
@@ -171,7 +175,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ) -> Result<FittedHypothesis<N>, GapError> {
         let mut fitted = self.state(point, start, asked)?;
         let mut slopes: Option<Vec<Response>> = None;
-        let mut lightest: usize = 0;
+        let mut region = TrustRegion {
+            radius: f64::INFINITY,
+        };
         for _ in 0..STEPS {
             let hypothesis = &fitted.hypothesis;
             let old = slopes.is_some();
@@ -185,27 +191,32 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 self.equations_with(point, &fitted, (&each, &Columns::default()));
             let equations = Equations::new(&clusters, hypothesis, &coordinates);
             let hopeless = equations.is_hopeless(fitted.cost, aim);
-            let next = |step: &Step| {
+            // A step that gains too little to first order need not be tried.
+            let least = FIRST_ORDER_SHARE * fitted.enough();
+            let mut trusted = region;
+            let mut found = None;
+            for _ in 0..TRIES {
+                let step = equations.step_within(trusted.radius);
+                let Some(step) = step.filter(|step| !hopeless && step.gain > least) else {
+                    break;
+                };
                 let moved = step.from(hypothesis, &coordinates);
-                let next = self.state(point, moved, fitted.asked.clone()).ok()?;
-                (next.cost < fitted.cost).then_some(next)
-            };
-            // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands. A step that gains too
-            // little to first order need not be tried, nor any that is damped more.
-            let found = (lightest.saturating_sub(1)..DAMPING.len())
-                .filter_map(|d| Some((d, equations.step(DAMPING[d])?)))
-                .take_while(|(_, step)| {
-                    !hopeless && step.gain > FIRST_ORDER_SHARE * fitted.enough()
-                })
-                .find_map(|(d, step)| Some((d, next(&step)?)));
-            let Some((damping, next)) = found else {
+                let next = self.state(point, moved, fitted.asked.clone()).ok();
+                let cost = next.as_ref().map_or(f64::INFINITY, |next| next.cost);
+                trusted.learn(&step, fitted.cost - cost);
+                found = next.filter(|next| next.cost < fitted.cost);
+                if found.is_some() {
+                    break;
+                }
+            }
+            // Where nothing decides an unknown, and where no step lowers the cost, what was found so far stands.
+            let Some(next) = found else {
                 if old {
                     continue;
                 }
                 break;
             };
-            // The next step tries what helped this one, and less.
-            lightest = damping;
+            region = trusted;
             let gained = fitted.cost - next.cost;
             fitted = next;
             if gained < fitted.enough() {
@@ -317,6 +328,29 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 }
 
+/// The region in which a linear model is trusted (Moré 1978).
+#[derive(Clone, Copy)]
+struct TrustRegion {
+    /// Longest step within it; see [`Step::length`].
+    radius: f64,
+}
+
+impl TrustRegion {
+    /// Makes the region larger or smaller by what a step gained in fact; what it lost is less than nothing.
+    fn learn(&mut self, step: &Step, gained: f64) {
+        /// Shares of the foretold gain below and above which the region is made smaller and larger.
+        const POOR: f64 = 0.25;
+        const GOOD: f64 = 0.75;
+        if gained > GOOD * step.gain {
+            self.radius = self.radius.max(2.0 * step.length);
+        } else if gained < POOR * step.gain {
+            // To where the parabola through the slope at the start and the cost at the end is lowest.
+            let lowest = step.slope / (2.0 * (step.slope - gained));
+            self.radius = step.length * lowest.clamp(0.1, 0.5);
+        }
+    }
+}
+
 /// A step of the unknowns that the equations decide anything about.
 #[derive(Default)]
 pub(crate) struct Step {
@@ -326,6 +360,10 @@ pub(crate) struct Step {
     pub sizes: Vec<f64>,
     /// By how much it lowers the cost, to first order.
     pub gain: f64,
+    /// The slope of the cost along it, downwards.
+    pub slope: f64,
+    /// Its length, with the diagonal of the normal equations as the measure of each unknown.
+    pub length: f64,
 }
 
 impl Step {
@@ -398,10 +436,25 @@ impl Equations {
                 .sum();
             a * (2.0 * score[i] - bent)
         });
+        let each = || std::iter::zip(usable, &sizes);
+        let squares = each().map(|(&i, a)| self.regularised[(i, i)] * a * a);
         Some(Step {
             gain: gain.sum(),
+            slope: each().map(|(&i, a)| 2.0 * a * score[i]).sum(),
+            length: libm::sqrt(squares.sum()),
             usable: usable.clone(),
             sizes,
+        })
+    }
+
+    /// The least damped step that is no longer than a radius; `None` where there is none.
+    fn step_within(&self, radius: f64) -> Option<Step> {
+        let within = |damping: &f64| self.step(*damping).filter(|step| step.length <= radius);
+        let first = DAMPING.first().and_then(within);
+        first.or_else(|| {
+            // More damping makes a step shorter.
+            let place = DAMPING.partition_point(|damping| within(damping).is_none());
+            within(DAMPING.get(place)?)
         })
     }
 }
@@ -479,6 +532,37 @@ mod tests {
         assert!(near(&plain, 3.0, 36.0) && near(&damped, 1.5, 27.0));
         let bounded = equations(4.0, 12.0, (-1.0, 1.0)).step(0.0).expect("a step");
         assert!(near(&bounded, 1.0, 20.0));
+    }
+
+    /// The whole step has a length of 6 and a slope of 72; with `d` times the diagonal more it is `1 + d` times as short.
+    #[test]
+    fn a_step_within_a_region_is_the_least_damped_one_that_is_no_longer() {
+        let equations = equations(4.0, 12.0, (-10.0, 10.0));
+        let size = |radius| equations.step_within(radius).map(|step| step.sizes[0]);
+        assert_eq!(size(f64::INFINITY), Some(3.0));
+        assert_eq!(size(6.0), Some(3.0));
+        // With three times the diagonal more: twice would do, and once would not.
+        assert_eq!(size(2.0), Some(0.75));
+        assert_eq!(size(1e-4), None);
+    }
+
+    #[test]
+    fn a_region_grows_where_a_step_gains_as_foretold_and_shrinks_to_the_lowest_point_of_a_parabola()
+    {
+        let whole = equations(4.0, 12.0, (-10.0, 10.0)).step(0.0);
+        let whole = whole.expect("not singular");
+        let after = |radius: f64, gained: f64| {
+            let mut region = TrustRegion { radius };
+            region.learn(&whole, gained);
+            region.radius
+        };
+        assert_eq!([after(6.0, 36.0), after(20.0, 36.0)], [12.0, 20.0]);
+        // Half of what was foretold changes nothing.
+        assert_eq!(after(6.0, 18.0), 6.0);
+        // It loses 36: through a slope of -72, the parabola is lowest at a third of the step.
+        assert!((after(6.0, -36.0) - 2.0).abs() < 1e-12);
+        assert_eq!(after(6.0, 5.0), 3.0);
+        assert!((after(6.0, f64::NEG_INFINITY) - 0.6).abs() < 1e-12);
     }
 
     /// A whole step gains 36; the fit may still gain four times as much.

@@ -76,8 +76,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             alone.named.remove(slot);
             asked.remove(slot);
             let settled = |hypothesis| self.settle(hypothesis, asked.clone()).ok();
-            let fitted = |hypothesis| settled(hypothesis).map(|s| s.0);
-            let best = cheapest(fitted(alone)?, (&base, &SMOOTHING), fitted);
+            let fitted = |hypothesis, _| settled(hypothesis).map(|s| s.0);
+            let best = cheapest(fitted(alone, 0.0)?, (&base, &SMOOTHING), fitted);
             let price = own.price * own.spread * scale;
             (best.cost < current.cost + price).then(|| settled(best.hypothesis))?
         })
@@ -99,16 +99,17 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     /// may have been bent by the smoothing that they were fitted with.
     fn smoothed(&self, fitted: &FittedHypothesis<N>, laws: &[Target]) -> FittedHypothesis<N> {
         // What cannot be simulated is not chosen.
-        let simulated = |hypothesis: Hypothesis<N>| {
+        let simulated = |hypothesis: Hypothesis<N>, aim: f64| {
             let asked = fitted.asked.clone();
             if fitted.leaves_much() {
                 let point = self.linearize(&hypothesis).ok()?;
-                return self.fit(&point, hypothesis, asked).ok();
+                return self.fit_towards(&point, (hypothesis, asked), aim).ok();
             }
             let point = self.simulate_alone(&hypothesis).ok()?;
             self.state(&point, hypothesis, asked).ok()
         };
-        let present = simulated(fitted.hypothesis.clone()).unwrap_or_else(|| fitted.clone());
+        let present = simulated(fitted.hypothesis.clone(), f64::INFINITY);
+        let present = present.unwrap_or_else(|| fitted.clone());
         let speeds: &[f64] = if fitted.leaves_much() {
             &SMOOTHING
         } else {
@@ -136,11 +137,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 /// The fit with the smoothing of each law that costs least.
 ///
 /// * `laws`, `speeds` - where each law has its smoothing, and the ones that are tried, ascending \[rad/s\]
-/// * `fitted` - the fit of a hypothesis, `None` where it cannot be simulated
+/// * `fitted` - the fit of a hypothesis, which may be given up where it will not cost less than a bound; `None` where it cannot be simulated
 fn cheapest<const N: usize>(
     mut best: FittedHypothesis<N>,
     (laws, speeds): (&[Target], &[f64]),
-    fitted: impl Fn(Hypothesis<N>) -> Option<FittedHypothesis<N>>,
+    fitted: impl Fn(Hypothesis<N>, f64) -> Option<FittedHypothesis<N>>,
 ) -> FittedHypothesis<N> {
     // The mode of one joint at rest changes the motion of others: a choice is tested again when another one has changed since.
     let mut since_change = 0;
@@ -152,7 +153,7 @@ fn cheapest<const N: usize>(
         // From speed to speed, up or down, as long as that costs less: the misfit has one minimum along them.
         for upwards in [true, false] {
             while let Some(next) = next_smoothing(speeds, best.hypothesis.get(law), upwards)
-                && let Some(other) = fitted(best.hypothesis.clone().with(law, next))
+                && let Some(other) = fitted(best.hypothesis.clone().with(law, next), best.cost)
                 && is_cheaper(&other, &best)
             {
                 best = other;
