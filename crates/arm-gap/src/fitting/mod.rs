@@ -5,3 +5,4 @@ pub mod free_decay_fit;
 pub mod lack_of_fit;
 pub mod precision;
 pub mod score_variance;
+pub mod step;

@@ -3,8 +3,9 @@
 use arm_numerics::Cholesky;
 
 use crate::GapError;
-use crate::fitting::fit::{FittedHypothesis, regularise};
+use crate::fitting::fit::FittedHypothesis;
 use crate::fitting::score_variance::{spread, trial_scores};
+use crate::fitting::step::regularise;
 use crate::hypothesis::{Coordinate, Target, priors};
 use crate::prepared_session::PreparedSession;
 use crate::sensitivity::linearization_point::LinearizationPoint;

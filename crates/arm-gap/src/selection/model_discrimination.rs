@@ -7,7 +7,7 @@ use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::course::{Channels, difference};
 use crate::data::session::Session;
-use crate::fitting::fit::regularise;
+use crate::fitting::step::regularise;
 use crate::hypothesis::priors;
 use crate::hypothesis::{Coordinate, Hypothesis};
 use crate::linearization::linear_response::Response;

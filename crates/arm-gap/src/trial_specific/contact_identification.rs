@@ -11,7 +11,7 @@ use arm_numerics::{Cholesky, Matrix};
 use crate::data::course::{Channels, away_from_gaps, difference, margin, smooth};
 use crate::data::noise::dot;
 use crate::data::session::ComparisonMode;
-use crate::fitting::fit::{Equations, Step};
+use crate::fitting::step::{Equations, Step};
 use crate::hypothesis::departure;
 use crate::hypothesis::{Coordinate, Hypothesis, Target};
 use crate::prepared_session::PreparedSession;
