@@ -119,7 +119,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             dry: [false; N],
             resting: Vec::new(),
             touched: Vec::new(),
-            dropped: session.base.iter().map(|law| !law.likely).collect(),
+            dropped: session.unlikely_laws(),
             start: None,
             threads,
             simulated: Arc::default(),

@@ -247,6 +247,11 @@ impl<const N: usize> Session<N> {
         hidden.map(|law| law.effect).collect()
     }
 
+    /// Which laws of the base measured motion does not show.
+    pub(crate) fn unlikely_laws(&self) -> Vec<bool> {
+        self.base.iter().map(|law| !law.likely).collect()
+    }
+
     /// Joints that move and are held all the same, from 0: what resists them is far above any viscosity.
     pub fn held_in_motion(&self) -> Vec<usize> {
         let held = |law: &&Passive| law.likely && law.free.is_empty();

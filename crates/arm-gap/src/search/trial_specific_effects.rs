@@ -58,7 +58,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             apart.trial_specific.push(found);
             settled = self.calibrate_anew()?;
         }
-        self.disturbances(settled, &mut apart.trial_specific, &[])
+        settled = self.disturbances(settled, &mut apart.trial_specific, &[])?;
+        match apart.trial_specific.iter().any(|one| one.trial.is_some()) {
+            true => self.with_base_anew(settled),
+            false => Ok(settled),
+        }
     }
 
     /// Looks for a slow oscillation where much is left, before effects are named that adapt to it.

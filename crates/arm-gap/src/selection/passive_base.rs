@@ -130,8 +130,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ///
     /// # Errors
     /// As [`PreparedSession::calibrate`].
-    pub(crate) fn calibrate_base(&mut self) -> Result<Settled<'a, N>, GapError> {
-        let mut settled = self.calibrate()?;
+    pub fn calibrate_base(&mut self) -> Result<Settled<'a, N>, GapError> {
+        let calibrated = self.calibrate()?;
+        let mut settled = self.with_unlikely_laws(calibrated);
         for _ in 0..TURNS {
             let terms = self.base_terms(&settled.1, &settled.0)?;
             self.start = Some(settled.0.hypothesis.clone());
@@ -145,6 +146,50 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             self.start = Some(settled.0.hypothesis.clone());
         }
         self.with_friction_at_rest(settled)
+    }
+
+    /// A calibrated base with the laws that measured motion does not show, where much is left without them and less with them: a joint whose
+    /// speed is mostly noise shows its viscosity as dry friction.
+    fn with_unlikely_laws(&mut self, settled: Settled<'a, N>) -> Settled<'a, N> {
+        if !settled.0.leaves_much() {
+            return settled;
+        }
+        let before = self.dropped.clone();
+        for (dropped, law) in self.dropped.iter_mut().zip(&self.session.base) {
+            *dropped &= law.free.is_empty();
+        }
+        if self.dropped != before
+            && let Ok(all) = self.calibrate()
+            && all.0.cost + all.0.enough() < settled.0.cost
+        {
+            return all;
+        }
+        self.dropped = before;
+        settled
+    }
+
+    /// Calibrates the base again from what measured motion suggested, once the disturbances of single trials are left out, where that leaves less:
+    /// a fit with a handle that slipped in one trial may be bent too far to find back.
+    ///
+    /// # Errors
+    /// As [`PreparedSession::calibrate_base`].
+    pub fn with_base_anew(&mut self, settled: Settled<'a, N>) -> Result<Settled<'a, N>, GapError> {
+        if self.session.base.is_empty() || !settled.0.leaves_much() {
+            return Ok(settled);
+        }
+        let mut anew = self.clone();
+        anew.start = None;
+        anew.dropped = self.session.unlikely_laws();
+        let calibrated = anew.read_anew().and_then(|()| anew.calibrate_base());
+        // Other samples may be compared, with another noise.
+        let misfit = |fitted: &FittedHypothesis<N>| fitted.cost / fitted.rows as f64;
+        match calibrated {
+            Ok(calibrated) if misfit(&calibrated.0) < misfit(&settled.0) => {
+                *self = anew;
+                Ok(calibrated)
+            }
+            _ => Ok(settled),
+        }
     }
 
     /// Tests the laws of the base again that were dropped before anything was named, as an effect named since may have hidden them. They

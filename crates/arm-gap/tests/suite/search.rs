@@ -2,6 +2,7 @@
 
 use arm_core::effect::{Effect, Kind};
 use arm_gap::data::session::Session;
+use arm_gap::fitting::fit::FittedHypothesis;
 use arm_gap::prepared_session::PreparedSession;
 
 use crate::sessions::session;
@@ -81,6 +82,58 @@ fn the_laws_of_a_passive_joint_are_named_with_what_could_stand_in_their_place() 
             assert!(!other.candidate.is_same_effect(effect));
         }
     }
+}
+
+/// The viscosity of a joint as a fitted hypothesis has it \[N m s/rad\].
+fn viscosity(fitted: &FittedHypothesis<2>, joint: usize) -> f64 {
+    let viscous = Kind::named("viscous").expect("known");
+    let mut known = fitted.hypothesis.known.iter();
+    let own = known.find(|law| (law.kind, law.index) == (viscous, joint));
+    own.expect("a law of the base").parameters[0]
+}
+
+/// What the noise of a speed hides from the regression shows in the simulation: the second joint has a viscosity of 0.5 N m s/rad in all.
+#[test]
+fn a_law_that_measured_motion_does_not_show_is_calibrated_where_much_is_left_without_it() {
+    let viscous = Kind::named("viscous").expect("known");
+    let mut session = little_known(&[Effect::new(viscous, 1).with(&[0.4])]);
+    for law in &mut session.base {
+        if (law.effect.kind, law.effect.index) == (viscous, 1) {
+            law.likely = false;
+            law.effect.parameters[0] = 0.0;
+        }
+    }
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let misfit = |fitted: &FittedHypothesis<2>| fitted.cost / fitted.rows as f64;
+    let (without, _) = prepared.calibrate().expect("a fit");
+    assert!(misfit(&without) > 1.5, "{}", misfit(&without));
+    let (fitted, _) = prepared.calibrate_base().expect("a fit");
+    assert!(misfit(&fitted) < 1.5, "{}", misfit(&fitted));
+    let found = viscosity(&fitted, 1);
+    assert!((found - 0.5).abs() < 0.05, "{found}");
+}
+
+#[test]
+fn a_base_that_was_bent_is_calibrated_anew_and_a_better_one_stays() {
+    let session = little_known(&[]);
+    let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
+    let good = prepared.calibrate_base().expect("a fit");
+    let (stays, _) = prepared.with_base_anew(good.clone()).expect("a fit");
+    assert_eq!(stays.hypothesis, good.0.hypothesis);
+    let (mut bent, point) = good.clone();
+    let viscous = Kind::named("viscous").expect("known");
+    for law in &mut bent.hypothesis.known {
+        if law.kind == viscous {
+            law.parameters[0] = 5.0;
+        }
+    }
+    bent.cost = 100.0 * bent.rows as f64;
+    let (anew, _) = prepared.with_base_anew((bent, point)).expect("a fit");
+    let found = [0, 1].map(|joint| viscosity(&anew, joint));
+    assert!(
+        found.iter().all(|found| (found - 0.1).abs() < 0.03),
+        "{found:?}"
+    );
 }
 
 #[test]
