@@ -247,7 +247,7 @@ impl<const N: usize> Session<N> {
         hidden.map(|law| law.effect).collect()
     }
 
-    /// Which laws of the base measured motion does not show.
+    /// For each law of the base, whether measured motion does not show it.
     pub(crate) fn unlikely_laws(&self) -> Vec<bool> {
         self.base.iter().map(|law| !law.likely).collect()
     }

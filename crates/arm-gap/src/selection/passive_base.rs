@@ -148,8 +148,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.with_friction_at_rest(settled)
     }
 
-    /// A calibrated base with the laws that measured motion does not show, where much is left without them and less with them: a joint whose
-    /// speed is mostly noise shows its viscosity as dry friction.
+    /// Calibrates again with the laws that measured motion does not show, where much is left; keeps that fit if it costs less. If the speed of
+    /// a joint is mostly noise, its viscosity can appear as dry friction.
     fn with_unlikely_laws(&mut self, settled: Settled<'a, N>) -> Settled<'a, N> {
         if !settled.0.leaves_much() {
             return settled;
@@ -168,8 +168,8 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         settled
     }
 
-    /// Calibrates the base again from what measured motion suggested, once the disturbances of single trials are left out, where that leaves less:
-    /// a fit with a handle that slipped in one trial may be bent too far to find back.
+    /// Calibrates again from the laws as they were identified from measured motion, where much is left; keeps the fit with the lower misfit. A
+    /// slip of the handle in one trial can lead the first fit to a wrong minimum, even after its samples are left out.
     ///
     /// # Errors
     /// As [`PreparedSession::calibrate_base`].
@@ -181,7 +181,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         anew.start = None;
         anew.dropped = self.session.unlikely_laws();
         let calibrated = anew.read_anew().and_then(|()| anew.calibrate_base());
-        // Other samples may be compared, with another noise.
+        // The two fits may have other samples and another noise.
         let misfit = |fitted: &FittedHypothesis<N>| fitted.cost / fitted.rows as f64;
         match calibrated {
             Ok(calibrated) if misfit(&calibrated.0) < misfit(&settled.0) => {

@@ -92,7 +92,7 @@ fn viscosity(fitted: &FittedHypothesis<2>, joint: usize) -> f64 {
     own.expect("a law of the base").parameters[0]
 }
 
-/// What the noise of a speed hides from the regression shows in the simulation: the second joint has a viscosity of 0.5 N m s/rad in all.
+/// The simulation shows a viscosity that the regression did not: 0.5 N m s/rad in the second joint, with that of all joints.
 #[test]
 fn a_law_that_measured_motion_does_not_show_is_calibrated_where_much_is_left_without_it() {
     let viscous = Kind::named("viscous").expect("known");
@@ -114,21 +114,21 @@ fn a_law_that_measured_motion_does_not_show_is_calibrated_where_much_is_left_wit
 }
 
 #[test]
-fn a_base_that_was_bent_is_calibrated_anew_and_a_better_one_stays() {
+fn a_base_in_a_wrong_minimum_is_calibrated_again_and_a_good_one_is_kept() {
     let session = little_known(&[]);
     let mut prepared = PreparedSession::new(&session, 2).expect("a sound session");
     let good = prepared.calibrate_base().expect("a fit");
     let (stays, _) = prepared.with_base_anew(good.clone()).expect("a fit");
     assert_eq!(stays.hypothesis, good.0.hypothesis);
-    let (mut bent, point) = good.clone();
+    let (mut wrong, point) = good.clone();
     let viscous = Kind::named("viscous").expect("known");
-    for law in &mut bent.hypothesis.known {
+    for law in &mut wrong.hypothesis.known {
         if law.kind == viscous {
             law.parameters[0] = 5.0;
         }
     }
-    bent.cost = 100.0 * bent.rows as f64;
-    let (anew, _) = prepared.with_base_anew((bent, point)).expect("a fit");
+    wrong.cost = 100.0 * wrong.rows as f64;
+    let (anew, _) = prepared.with_base_anew((wrong, point)).expect("a fit");
     let found = [0, 1].map(|joint| viscosity(&anew, joint));
     assert!(
         found.iter().all(|found| (found - 0.1).abs() < 0.03),
