@@ -49,6 +49,11 @@ impl<const N: usize> FittedHypothesis<N> {
         ENOUGH + SHARE * (self.cost - self.rows as f64).max(0.0)
     }
 
+    /// What is left for each row; noise leaves 1.
+    pub fn misfit(&self) -> f64 {
+        self.cost / self.rows as f64
+    }
+
     /// Whether more is left than noise leaves.
     pub(crate) fn leaves_much(&self) -> bool {
         /// Misfit for each row from which on much is left: noise leaves 1.

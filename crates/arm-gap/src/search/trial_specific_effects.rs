@@ -45,7 +45,8 @@ impl<const N: usize> TrialSpecificEffects<N> {
 }
 
 impl<'a, const N: usize> PreparedSession<'a, N> {
-    /// Sets apart effects that differ between trials: a rhythm, from the differences of repeats, and disturbances of single trials.
+    /// Sets apart effects that differ between trials: a rhythm, from the differences of repeats, and disturbances of single trials. Beside
+    /// disturbances the base may be calibrated again.
     pub(crate) fn set_apart(
         &mut self,
         mut settled: Settled<'a, N>,
@@ -59,10 +60,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             settled = self.calibrate_anew()?;
         }
         settled = self.disturbances(settled, &mut apart.trial_specific, &[])?;
-        match apart.trial_specific.iter().any(|one| one.trial.is_some()) {
-            true => self.with_base_anew(settled),
-            false => Ok(settled),
+        if apart.trial_specific.iter().any(|one| one.trial.is_some()) {
+            settled = self.with_base_anew(settled);
         }
+        Ok(settled)
     }
 
     /// Looks for a slow oscillation where much is left, before effects are named that adapt to it.
@@ -73,8 +74,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     ) {
         let (fitted, point) = settled;
         if fitted.leaves_much() {
-            let scale = fitted.cost / fitted.rows as f64;
-            apart.periodic = self.in_phase((fitted, point), scale);
+            apart.periodic = self.in_phase((fitted, point), fitted.misfit());
         }
     }
 

@@ -169,26 +169,23 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Calibrates again from the laws as they were identified from measured motion, where much is left; keeps the fit with the lower misfit. A
-    /// slip of the handle in one trial can lead the first fit to a wrong minimum, even after its samples are left out.
-    ///
-    /// # Errors
-    /// As [`PreparedSession::calibrate_base`].
-    pub fn with_base_anew(&mut self, settled: Settled<'a, N>) -> Result<Settled<'a, N>, GapError> {
+    /// slip of the handle in one trial can lead the first fit to a wrong minimum, even after its samples are left out. Where it cannot be
+    /// calibrated again, the first fit stays.
+    pub fn with_base_anew(&mut self, settled: Settled<'a, N>) -> Settled<'a, N> {
         if self.session.base.is_empty() || !settled.0.leaves_much() {
-            return Ok(settled);
+            return settled;
         }
         let mut anew = self.clone();
         anew.start = None;
         anew.dropped = self.session.unlikely_laws();
         let calibrated = anew.read_anew().and_then(|()| anew.calibrate_base());
         // The two fits may have other samples and another noise.
-        let misfit = |fitted: &FittedHypothesis<N>| fitted.cost / fitted.rows as f64;
         match calibrated {
-            Ok(calibrated) if misfit(&calibrated.0) < misfit(&settled.0) => {
+            Ok(calibrated) if calibrated.0.misfit() < settled.0.misfit() => {
                 *self = anew;
-                Ok(calibrated)
+                calibrated
             }
-            _ => Ok(settled),
+            _ => settled,
         }
     }
 
