@@ -22,8 +22,10 @@ const LEAST_SIZE: f64 = 1e-2;
 const FIRST_DAMPING: f64 = 1e-3;
 /// Beyond this damping no step is left.
 const MOST_DAMPING: f64 = 1e12;
-/// Converged when the predicted reduction of the sum of squares is less than this share of it.
+/// Converged when the predicted reduction of the sum of squares is less than this share of it,
 const SETTLED: f64 = 1e-10;
+/// or less than this share and not obtained: what is left then is rounding of the differences.
+const ROUNDED: f64 = 1e-8;
 /// Most rounds.
 const MOST_ROUNDS: usize = 100;
 
@@ -161,6 +163,10 @@ impl<const N: usize> Search<'_, N> {
                 Some((Ok(fewer), there)) if fewer < squares => {
                     (squares, here, x) = (fewer, there, candidate);
                     damping *= 0.1;
+                }
+                _ if promised <= ROUNDED * (1.0 + squares) => {
+                    settled = true;
+                    break;
                 }
                 _ => damping *= 10.0,
             }
