@@ -35,14 +35,18 @@ fn free(max: f64) -> Vec<Free> {
         .collect()
 }
 
-fn fitted(recording: &Recording<3>, start: [f64; 6], max: f64) -> Result<Fit, IdentError> {
-    let recorded = Recorded {
+/// A recording as a fit takes it.
+fn recorded(recording: &Recording<3>) -> Recorded<'_, 3> {
+    Recorded {
         q: &recording.q,
         force_on_arm: &recording.force_on_arm,
         angle_noise: [ANGLE_NOISE; 3],
         force_noise: [FORCE_NOISE; 2],
-    };
-    fit(&experiment(start), &recorded, &free(max), 1)
+    }
+}
+
+fn fitted(recording: &Recording<3>, start: [f64; 6], max: f64) -> Result<Fit, IdentError> {
+    fit(&experiment(start), &recorded(recording), &free(max), 1)
 }
 
 #[test]
@@ -87,14 +91,8 @@ fn no_round_is_spent_on_steps_that_rounding_refuses() {
         experiment
     };
     let recording = noisy(&long(TRUE), 0);
-    let recorded = Recorded {
-        q: &recording.q,
-        force_on_arm: &recording.force_on_arm,
-        angle_noise: [ANGLE_NOISE; 3],
-        force_noise: [FORCE_NOISE; 2],
-    };
     let start = long([0.1, 1.0, 0.1, 1.0, 0.1, 1.0]);
-    let found = fit(&start, &recorded, &free(20.0), 1).expect("a fit");
+    let found = fit(&start, &recorded(&recording), &free(20.0), 1).expect("a fit");
     assert!(found.settled && found.rounds < 9, "{} rounds", found.rounds);
 }
 
@@ -135,12 +133,7 @@ fn a_rhythm_that_loses_its_amplitude_to_a_wrong_phase_is_found_again() {
         run
     };
     let recording = simulate(&rhythm(0.4, 0.0)).expect("runs");
-    let recorded = Recorded {
-        q: &recording.q,
-        force_on_arm: &recording.force_on_arm,
-        angle_noise: [ANGLE_NOISE; 3],
-        force_noise: [FORCE_NOISE; 2],
-    };
+    let recorded = recorded(&recording);
     let free = |parameter, [min, max]: [f64; 2]| Free {
         effect: 6,
         parameter,
