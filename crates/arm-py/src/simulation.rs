@@ -294,7 +294,8 @@ pub fn experiment<const N: usize>(
     experiment.integrator = match settings.integrator.as_str() {
         "rk4" => Integrator::Rk4,
         "euler" => Integrator::SemiImplicitEuler,
-        other => return Err(bad_input("integrator", other, "rk4 or euler")),
+        "imex" => Integrator::Imex,
+        other => return Err(bad_input("integrator", other, "rk4, euler or imex")),
     };
     let given = |name: &str, values: &Option<Vec<f64>>| match values {
         Some(v) if v.len() == N => Ok(Some(Joints::<f64, N>::from_column_slice(v))),

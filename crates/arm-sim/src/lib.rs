@@ -31,6 +31,7 @@ pub use experiment::piecewise_cubic::{Interpolation, Jet, Series, cubic_weights}
 pub use experiment::sample_experiments;
 pub use experiment::step_grid::MOST_STEPS;
 pub use free_memory::{require_memory, reserve_memory};
+pub use integrators::implicit_friction::{ImplicitFriction, SmoothFriction, WithFriction};
 pub use laboratory::interaction_control::{
     Interaction, InteractionLaw, Support, Yielded, interact,
 };

@@ -31,6 +31,7 @@ class Integrator(str, enum.Enum):
 
     rk4 = "rk4"
     euler = "euler"
+    imex = "imex"
 
 
 class Coupling(str, enum.Enum):
@@ -66,7 +67,7 @@ def simulate(
         float, typer.Option(help="Recorded samples per second [Hz], 0.001 or more; the interval is a whole number of steps.")
     ] = 50.0,
     integrator: Annotated[
-        Integrator | None, typer.Option(help="Of the native engine: fourth order (when absent), or semi-implicit of first order.")
+        Integrator | None, typer.Option(help="Of the native engine: fourth order (when absent), semi-implicit of first order, or imex, implicit in friction.")
     ] = None,
     coupling: Annotated[Coupling, typer.Option(help="How the handle holds the tip.")] = Coupling.compliant,
     duration_s: Annotated[

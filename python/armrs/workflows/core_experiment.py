@@ -31,6 +31,10 @@ class CoreDrive:
     """Activity of the muscles of each joint at the times, 0 to 1."""
 
 
+INTEGRATORS = ("rk4", "euler", "imex")
+"""Integrators of the native engine."""
+
+
 @dataclass(frozen=True)
 class CoreRun:
     """How a run is computed: where it starts, its length [s] where the drive does not define it, and time from sample to sample [s]."""

@@ -15,7 +15,7 @@ from ..errors import BadInput
 from ..io.trial import Trial
 from ..model import Effect, Model, load_model
 from ..tabular import Framed, Tidy
-from .core_experiment import CoreRun, driven
+from .core_experiment import INTEGRATORS, CoreRun, driven
 from .movement import Movement
 from .simulate import DEFAULT_RATE
 from .stiction import DEFAULT_DT
@@ -105,7 +105,7 @@ def fit_by_simulation(
     """
     model = checks.loaded("model", model, Model, load_model)
     checks.instance("drive", drive, Movement, Trial, type(None))
-    checks.choice("integrator", integrator, ("rk4", "euler"))
+    checks.choice("integrator", integrator, INTEGRATORS)
     positive = {"dt": (dt, "s"), "rate": (rate, "Hz"), "angle_noise": (angle_noise, "rad"), "force_noise": (force_noise, "N")}
     for name, (value, unit) in positive.items():
         checks.number(name, value, above=0.0, unit=unit)

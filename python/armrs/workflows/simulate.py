@@ -20,7 +20,7 @@ from ..io.trial import Trial
 from ..model import Model, load_model
 from ..result_warnings import with_warnings
 from ..tabular import Labelled, Series, Tabular, Tidy
-from .core_experiment import CoreDrive, CoreRun, about, driven
+from .core_experiment import INTEGRATORS, CoreDrive, CoreRun, about, driven
 from .movement import Movement
 from .simulation_accuracy import EnergyBalance, energy_balance
 from .stiction import DEFAULT_DT, smoothings, steps_to_try, sticking
@@ -310,8 +310,9 @@ def simulate(
         The desired movement; a measured trial, whose robot angles (or else joint torques) drive the arm; or nothing, and it swings.
     engine : {"native", "rapier"}
         Minimal coordinates, or rigid bodies and joints in maximal coordinates.
-    integrator : {"rk4", "euler"}, optional
-        Of the native engine: fourth order, taken when absent, or semi-implicit first order.
+    integrator : {"rk4", "euler", "imex"}, optional
+        Of the native engine: fourth order, taken when absent; semi-implicit first order; or second order with the friction of joints
+        implicit, for smooth dry friction however steep it is, at a step of 1 ms or 2 ms.
     dt : float, optional
         Step [s]. When absent 0.25 ms, or a 4th, 16th or 64th of it where smooth dry friction is too steep for it: the longest with which
         less than 1e-5 of the exchanged energy is unaccounted for. At any step, constant friction with the default smoothing that is too
@@ -442,8 +443,8 @@ def _check_accuracy(accuracy: float | None, dt: float | None, engine: str, integ
         raise BadInput("dt, accuracy", Text("both"), "one of them: the step is found for the accuracy")
     if engine == "rapier":
         raise BadInput("accuracy", accuracy, "none beside the engine rapier, whose error has no known order")
-    if integrator == "euler":
-        raise BadInput("accuracy", accuracy, "none beside the integrator euler; the step is found for rk4")
+    if integrator not in (None, "rk4"):
+        raise BadInput("accuracy", accuracy, f"none beside the integrator {integrator}; the step is found for rk4")
 
 
 @dataclass(frozen=True, eq=False)
@@ -532,7 +533,7 @@ def _integrator(given: str | None, engine: str) -> str:
         return "rk4"
     if engine == "rapier":
         raise BadInput("integrator", given, "none beside the engine rapier, which has its own")
-    return checks.choice("integrator", given, ("rk4", "euler"))
+    return checks.choice("integrator", given, INTEGRATORS)
 
 
 def _clock(dt: float, rate: float) -> Text:

@@ -184,6 +184,26 @@ impl<T: Scalar, const N: usize> BiasAndJacobian<T, N> {
     }
 }
 
+/// The inertia matrix with a base that moves with the first joint.
+pub(crate) fn with_base<T: Scalar, const N: usize>(
+    mut inertia: JointMatrix<T, N>,
+    chain: &Chain<T, N>,
+    base: Option<&MovingBase<T>>,
+    pose: &Pose<T, N>,
+) -> JointMatrix<T, N> {
+    if let Some(base) = base {
+        let [uy, uz] = base.per_angle;
+        let rows = first_moment_rows(chain, pose);
+        for k in 0..N {
+            let coupling = uy * rows[0][k] + uz * rows[1][k];
+            inertia[(0, k)] += coupling;
+            inertia[(k, 0)] += coupling;
+        }
+        inertia[(0, 0)] += base.mass * (uy.squared() + uz.squared());
+    }
+    inertia
+}
+
 impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
     pub fn new(
         chain: &Chain<T, N>,
@@ -194,7 +214,7 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
         let rate = jacobian_rate(chain, pose, qd);
         let bias = inverse_dynamics(chain, pose, qd, &Joints::repeat(T::ZERO));
         let mut terms = Self {
-            inertia: inertia(chain, pose),
+            inertia: with_base(inertia(chain, pose), chain, base, pose),
             given: BiasAndJacobian::new(bias, chain, (base, placement), (pose, qd)),
             jacobian_rate: [0, 1].map(|row| {
                 let mut sum = T::ZERO;
@@ -204,16 +224,6 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
                 sum
             }),
         };
-        if let Some(base) = base {
-            let [uy, uz] = base.per_angle;
-            let rows = first_moment_rows(chain, pose);
-            for k in 0..N {
-                let coupling = uy * rows[0][k] + uz * rows[1][k];
-                terms.inertia[(0, k)] += coupling;
-                terms.inertia[(k, 0)] += coupling;
-            }
-            terms.inertia[(0, 0)] += base.mass * (uy.squared() + uz.squared());
-        }
         if let Some(placement) = placement {
             let turning = placement.centripetal(pose, qd);
             for axis in 0..2 {

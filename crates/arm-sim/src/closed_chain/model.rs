@@ -4,14 +4,14 @@ use arm_core::effect::{
     Effect, Local, Motion, States, any_state, dry_friction, resisting_besides_dry, resisting_torque,
 };
 use arm_core::{
-    Chain, Contact, Invalid, Joints, Load, Placement, Plane, Pose, Products, Resistance, Scalar,
-    Setup, accelerations, gravity, joint_force, kinetic_energy, potential_energy, tip,
-    tip_velocity,
+    Chain, Contact, Invalid, JointMatrix, Joints, Load, Placement, Plane, Pose, Products,
+    Resistance, Scalar, Setup, accelerations, gravity, inertia, joint_force, kinetic_energy,
+    potential_energy, tip, tip_velocity,
 };
 
 use crate::closed_chain::branch_free::{BranchFree, affine, contact_gap, load, pull};
 use crate::closed_chain::joint_space::{
-    BiasAndJacobian, JointSpaceEquation, MovingBase, add_inertia, first_moment_rows,
+    BiasAndJacobian, JointSpaceEquation, MovingBase, add_inertia, first_moment_rows, with_base,
 };
 use crate::closed_chain::state::{Input, Outcome, State, difference, powers, sum};
 
@@ -287,6 +287,11 @@ impl<T: Scalar, const N: usize> Model<T, N> {
         *total = sum(total, &others);
     }
 
+    /// Viscosity of each joint \[N m s/rad\].
+    pub fn viscosity(&self) -> Joints<T, N> {
+        Joints::from_fn(|j, _| self.affine[j][2])
+    }
+
     /// Largest torque of the set-valued dry friction of each joint \[N m\].
     #[inline]
     pub fn dry_friction(&self, motion: &Motion<T, N>, memory: &[States<T>]) -> [T; N] {
@@ -540,6 +545,16 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             &self.chain,
             attached,
             (pose, &Joints::repeat(T::ZERO)),
+        )
+    }
+
+    /// The inertia matrix in joint coordinates \[kg m²\].
+    pub fn inertia(&self, pose: &Pose<T, N>) -> JointMatrix<T, N> {
+        with_base(
+            inertia(&self.chain, pose),
+            &self.chain,
+            self.base.as_ref(),
+            pose,
         )
     }
 

@@ -1,10 +1,17 @@
 //! Limits of the step: stability of the contact's vibration, and steep dry friction.
 
 use arm_core::effect::Effect;
-use arm_core::{Chain, Contact, Joints, Pose, Setup, inertia};
+use arm_core::{Chain, Contact, Joints, Plane, Pose, Setup, inertia};
+use nalgebra::SMatrix;
 
+use crate::closed_chain::joint_space::JointSpaceEquation;
 use crate::closed_chain::model::{Link, Model};
 use crate::{Integrator, SimulationError};
+
+/// The method of [`Integrator::Imex`]: time of the middle stage as a fraction of the step,
+pub(crate) const MIDDLE: f64 = 1.0 - core::f64::consts::FRAC_1_SQRT_2;
+/// and weight of the start in the explicit part.
+pub(crate) const START: f64 = 1.0 - 0.5 / MIDDLE;
 
 /// The fastest vibration of an arm on the springs and dampers of its contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,9 +25,9 @@ pub struct Vibration {
 impl Vibration {
     /// Largest step for which the vibration does not grow \[s\].
     ///
-    /// Both limits hold for the mode `ẍ + c ẋ + ω² x = 0` with the largest c and the largest ω together, which is exact
+    /// The limits hold for the mode `ẍ + c ẋ + ω² x = 0` with the largest c and the largest ω together, which is exact
     /// where damping and stiffness share their directions, and safe elsewhere:
-    /// semi-implicit Euler `ω²h² + 2ch < 4`; Rk4 `|λ| h < 2.61`, the radius of its region of stability in the left half-plane.
+    /// semi-implicit Euler `ω²h² + 2ch < 4`; Rk4 `|λ| h < 2.61`, the radius of its region of stability in the left half-plane. For Imex see [`Imex`].
     pub fn largest_step(&self, integrator: Integrator) -> f64 {
         let (w, c) = (self.frequency, self.damping);
         match integrator {
@@ -29,6 +36,11 @@ impl Vibration {
                 let overdamped = (c * c - 4.0 * w * w).max(0.0).sqrt();
                 RK4_RADIUS / w.max(0.5 * (c + overdamped))
             }
+            Integrator::Imex => Imex {
+                by_place: SMatrix::from_diagonal_element(w * w),
+                by_speed: SMatrix::from_diagonal_element(c),
+            }
+            .largest_step(4.0 / w.max(c)),
         }
     }
 
@@ -40,8 +52,7 @@ impl Vibration {
     ) -> Self {
         let terms = model.terms(&Pose::new(q), &Joints::zeros());
         // B⁻¹ Jᵀ S J has the eigenvalues of the 2×2 matrix J B⁻¹ Jᵀ S.
-        let columns = [[1.0, 0.0], [0.0, 1.0]]
-            .map(|f| terms.tip_rate(&terms.accelerate(&terms.tip_torque(f))));
+        let columns = yielding(&terms);
         let largest = |s: [f64; 2]| {
             let (a, d) = (columns[0][0] * s[0], columns[1][1] * s[1]);
             let bc = columns[0][1] * columns[1][0] * s[0] * s[1];
@@ -52,6 +63,87 @@ impl Vibration {
             frequency: largest(contact.stiffness).sqrt(),
             damping: largest(contact.damping),
         }
+    }
+}
+
+/// Accelerations of the tip for one newton along each axis \[1/kg\].
+fn yielding<const N: usize>(terms: &JointSpaceEquation<f64, N>) -> [Plane<f64>; 2] {
+    let unit = [[1.0, 0.0], [0.0, 1.0]];
+    unit.map(|f| terms.tip_rate(&terms.accelerate(&terms.tip_torque(f))))
+}
+
+/// A tip on its contact, as [`Integrator::Imex`] takes it: `ẍ = −by_place x − by_speed ẋ`, with forces explicit and the speed implicit.
+struct Imex {
+    by_place: SMatrix<f64, 2, 2>,
+    by_speed: SMatrix<f64, 2, 2>,
+}
+
+impl Imex {
+    fn at<const N: usize>(
+        contact: &Contact<f64>,
+        model: &Model<f64, N>,
+        q: &Joints<f64, N>,
+    ) -> Self {
+        let columns = yielding(&model.terms(&Pose::new(q), &Joints::zeros()));
+        let scaled = |by: [f64; 2]| SMatrix::from_fn(|row, axis| columns[axis][row] * by[axis]);
+        Self {
+            by_place: scaled(contact.stiffness),
+            by_speed: scaled(contact.damping),
+        }
+    }
+
+    /// Whether a vibration grows with a step: by the size of a high power of what a step makes of place and speed.
+    fn grows(&self, h: f64) -> bool {
+        /// Squarings, and growth in each step that is rounding.
+        const SQUARINGS: u32 = 24;
+        const ROUNDING: f64 = 1e-6;
+        let [x, v] = self.step(
+            h,
+            [0, 2].map(|first| SMatrix::from_fn(|row, column| f64::from(first + row == column))),
+        );
+        let mut power = SMatrix::<f64, 4, 4>::from_fn(|row, column| {
+            if row < 2 {
+                x[(row, column)]
+            } else {
+                v[(row - 2, column)]
+            }
+        });
+        let mut logarithm = 0.0;
+        for _ in 0..SQUARINGS {
+            let size = power.amax();
+            if !(size > 0.0 && size.is_finite()) {
+                return size != 0.0;
+            }
+            power /= size;
+            logarithm = 2.0 * (logarithm + libm::log(size));
+            power *= power;
+        }
+        logarithm + libm::log(power.amax()) > ROUNDING * f64::from(1_u32 << SQUARINGS)
+    }
+
+    /// What a step makes of places and speeds, one in each column.
+    fn step(&self, h: f64, [x, v]: [SMatrix<f64, 2, 4>; 2]) -> [SMatrix<f64, 2, 4>; 2] {
+        let pulled = |x: SMatrix<f64, 2, 4>, v| -(self.by_place * x) - self.by_speed * v;
+        let reach = MIDDLE * h;
+        let first = pulled(x, v);
+        let middle = v + first * reach;
+        let second = pulled(x + middle * reach, middle);
+        let end = v + (first * START + second * (1.0 - START)) * h;
+        [x + middle * (h - reach) + end * reach, end]
+    }
+
+    /// Largest step with which no vibration grows, up to one with which some does \[s\].
+    fn largest_step(&self, too_long: f64) -> f64 {
+        let (mut least, mut most) = (0.0, too_long);
+        for _ in 0..50 {
+            let middle = 0.5 * (least + most);
+            if self.grows(middle) {
+                most = middle;
+            } else {
+                least = middle;
+            }
+        }
+        least
     }
 }
 
@@ -107,11 +199,25 @@ pub(crate) fn check<const N: usize>(
     (integrator, dt): (Integrator, f64),
     q: &Joints<f64, N>,
 ) -> Result<(), SimulationError> {
+    if integrator == Integrator::Imex && matches!(model.link, Link::Rigid) {
+        return Err(SimulationError::Unsupported {
+            engine: "native",
+            what: "a rigid coupling with the integrator imex, allowed are rk4 and euler",
+        });
+    }
     let Link::Compliant(contact) = &model.link else {
         return Ok(());
     };
     let vibration = Vibration::at(contact, model, q);
-    let largest = vibration.largest_step(integrator);
+    let largest = if integrator == Integrator::Imex {
+        let imex = Imex::at(contact, model, q);
+        if !imex.grows(dt) {
+            return Ok(());
+        }
+        imex.largest_step(dt)
+    } else {
+        vibration.largest_step(integrator)
+    };
     if dt <= largest {
         return Ok(());
     }

@@ -96,10 +96,13 @@ fn set<const L: usize, const N: usize>(experiments: &[Experiment<N>]) -> Outcome
     outcomes
 }
 
-/// Whether a run may share lanes: with set-valued friction only if that is simple, and by Rk4.
+/// Whether a run may share lanes: with set-valued friction only if that is simple, and by Rk4; with [`Integrator::Imex`] not.
 fn may_be_beside<const N: usize>(run: &Prepared<N>) -> bool {
-    let is_simple = || run.integrator() == Integrator::Rk4 && run.model.has_simple_friction();
-    !run.model.has_dry || is_simple()
+    match run.integrator() {
+        Integrator::Imex => false,
+        Integrator::Rk4 if run.model.has_simple_friction() => true,
+        Integrator::Rk4 | Integrator::SemiImplicitEuler => !run.model.has_dry,
+    }
 }
 
 /// Whether two runs take the same steps.

@@ -40,7 +40,8 @@ pub(crate) fn run<const N: usize>(
     };
     let mut wanted = sample(0, &state, &memory.state).is_continue();
     let mut feed = InputBuffer::new(prepared.integrator());
-    let plain = prepared.model.plain();
+    let is_explicit = prepared.integrator() != Integrator::Imex;
+    let plain = prepared.model.plain().filter(|_| is_explicit);
     let mut stopped = None;
     let mut broken = prepared.discontinuities.steps().peekable();
     let (mut done, mut sampled) = (0, 0);
@@ -133,7 +134,7 @@ pub(crate) trait BranchFreeSteps<T: Scalar, const N: usize> {
     fn advance(&self, integrator: Integrator, steps: usize, state: &mut State<T, N>) -> usize {
         match integrator {
             Integrator::SemiImplicitEuler => self.strides::<false>(steps, state),
-            Integrator::Rk4 => self.strides::<true>(steps, state),
+            Integrator::Rk4 | Integrator::Imex => self.strides::<true>(steps, state),
         }
     }
 

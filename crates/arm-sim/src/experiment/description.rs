@@ -179,7 +179,7 @@ pub enum Start<const N: usize> {
     },
 }
 
-/// How a step is made. Both have a fixed step; the same run has the same bits everywhere.
+/// How a step is made. All have a fixed step; the same run has the same bits everywhere.
 ///
 /// Where the drive is not smooth (a ramp of a movement ends, or a sample of a series) inside a step, the step is made in
 /// pieces, so that the order below holds wherever such times lie. It does not hold where the arm itself is not smooth: a
@@ -199,4 +199,8 @@ pub enum Integrator {
     /// [`Recording::energy_error`](crate::Recording::energy_error) is of fourth order too: below 5·10⁻¹² of the exchanged energy a second at the default
     /// step for movements as slow as those of the thesis, with a compliant and a rigid coupling.
     Rk4,
+    /// Viscosity and dry friction of joints implicitly, all else explicitly, by the method ARS(2,2,2) of Ascher, Ruuth, Spiteri 1997; second order, two evaluations a step.
+    /// Smooth dry friction may be as steep as it likes: with that of 0.16 N m at 0.003 rad/s on a hand, a step of 2 ms errs by less than
+    /// 10⁻⁴ rad, where [`Integrator::Rk4`] with 1 ms errs by more than 0.01 rad. Switches of set-valued friction are not located. Not for a rigid coupling.
+    Imex,
 }

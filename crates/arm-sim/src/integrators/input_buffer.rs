@@ -52,7 +52,7 @@ impl<T: Scalar, const N: usize> InputBuffer<T, N> {
     pub fn new(integrator: Integrator) -> Self {
         let points = match integrator {
             Integrator::SemiImplicitEuler => 1,
-            Integrator::Rk4 => 2,
+            Integrator::Rk4 | Integrator::Imex => 2,
         };
         Self {
             block: Vec::with_capacity(AHEAD * points + 1),

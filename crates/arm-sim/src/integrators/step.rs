@@ -6,6 +6,7 @@ use arm_core::{Joints, Scalar};
 
 use crate::closed_chain::model::{Link, Model};
 use crate::closed_chain::state::{Input, Outcome, State};
+use crate::integrators::implicit_friction::SmoothFriction;
 use crate::{Integrator, SimulationError};
 
 /// Newton steps that bring a rigidly held tip back to its handle: after a step it is off by the error of the integrator
@@ -56,6 +57,8 @@ pub(crate) struct Memory<T> {
     sum: Vec<States<T>>,
     /// The states before a step that may have to be made again.
     pub kept: Vec<States<T>>,
+    /// Memory for the smooth friction of a step.
+    pub smooth: Vec<SmoothFriction>,
     /// Why a step could not be made.
     pub ambiguous_friction: Option<AmbiguousFriction>,
 }
@@ -69,7 +72,55 @@ impl<T: Scalar> Memory<T> {
             rate: zeros.clone(),
             sum: zeros.clone(),
             kept: zeros,
+            smooth: Vec::with_capacity(effects),
             ambiguous_friction: None,
+        }
+    }
+}
+
+impl<T: Scalar> Memory<T> {
+    /// Brings the states of effects to a stage, `ahead` of the start along the motion there.
+    pub fn advance_to_stage<const N: usize>(
+        &mut self,
+        model: &Model<T, N>,
+        ahead: T,
+        (input, q, qd): (&Input<T, N>, &Joints<T, N>, &Joints<T, N>),
+        now: &Outcome<T, N>,
+    ) {
+        if model.has_memory {
+            model.memory_rates(&motion(input, q, qd, now), &self.state, &mut self.sum);
+            let (states, rates) = (self.state.as_flattened(), self.sum.as_flattened());
+            for (i, at) in self.stage.as_flattened_mut().iter_mut().enumerate() {
+                *at = states[i] + ahead * rates[i];
+            }
+        }
+    }
+
+    /// The states of effects at a stage.
+    pub fn at_stage<const N: usize>(&self, model: &Model<T, N>) -> &[States<T>] {
+        if model.has_memory {
+            &self.stage
+        } else {
+            &self.state
+        }
+    }
+
+    /// Brings the states of effects from the start to the end of a step.
+    ///
+    /// * `parts` - of the step, in which they go on as at the start and as at the stage
+    pub fn advance_to_end<const N: usize>(
+        &mut self,
+        model: &Model<T, N>,
+        parts: [T; 2],
+        (input, q, qd): (&Input<T, N>, &Joints<T, N>, &Joints<T, N>),
+        now: &Outcome<T, N>,
+    ) {
+        if model.has_memory {
+            model.memory_rates(&motion(input, q, qd, now), &self.stage, &mut self.rate);
+            let (early, late) = (self.sum.as_flattened(), self.rate.as_flattened());
+            for (i, state) in self.state.as_flattened_mut().iter_mut().enumerate() {
+                *state += parts[0] * early[i] + parts[1] * late[i];
+            }
         }
     }
 }
@@ -85,7 +136,9 @@ pub(crate) fn step<T: Scalar, const N: usize>(
 ) {
     match integrator {
         Integrator::SemiImplicitEuler => semi_implicit_euler(model, h, inputs, state, memory),
-        Integrator::Rk4 => rk4_by_calls(model, (h, inputs), (state, memory), &mut { model }),
+        Integrator::Rk4 | Integrator::Imex => {
+            rk4_by_calls(model, (h, inputs), (state, memory), &mut { model })
+        }
     }
     if matches!(model.link, Link::Rigid) {
         model.project(inputs.end, state, (PROJECTIONS, &[false; N]));

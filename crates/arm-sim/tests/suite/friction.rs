@@ -35,6 +35,7 @@ fn a_joint_that_slides_out_stops_where_it_must() {
     for (integrator, within) in [
         (Integrator::Rk4, 1e-12),
         (Integrator::SemiImplicitEuler, 1e-4),
+        (Integrator::Imex, 1e-5),
     ] {
         let mut experiment = free(0.1, 0.30003);
         experiment.integrator = integrator;

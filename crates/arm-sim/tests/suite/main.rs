@@ -11,6 +11,7 @@ mod friction;
 mod friction_reference;
 mod golden;
 mod heave;
+mod imex;
 mod interaction_control;
 mod joint_controller;
 mod long;

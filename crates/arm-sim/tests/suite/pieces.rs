@@ -67,7 +67,11 @@ fn together<const N: usize>(
 fn pieces_have_the_bits_of_the_whole() {
     let mut experiment = sample_experiments::reference().expect("a sample experiment");
     experiment.duration = 0.5;
-    for integrator in [Integrator::Rk4, Integrator::SemiImplicitEuler] {
+    for integrator in [
+        Integrator::Rk4,
+        Integrator::SemiImplicitEuler,
+        Integrator::Imex,
+    ] {
         experiment.integrator = integrator;
         let whole = simulate_with(Engine::Native, &experiment).expect("the experiment runs");
         for samples in [1, 7, whole.len(), 1000] {

@@ -124,7 +124,7 @@ impl<const N: usize> Response<N> {
 }
 
 /// An arm in one state, for which accelerations are computed with any friction and any torques.
-pub(super) struct Arm<'a, const N: usize> {
+pub(crate) struct Arm<'a, const N: usize> {
     model: &'a Model<f64, N>,
     input: &'a Input<f64, N>,
     /// Without joint forces.
@@ -155,7 +155,7 @@ impl<const N: usize> Form<N> {
 
 impl<'a, const N: usize> Arm<'a, N> {
     #[inline(always)]
-    pub(super) fn at(
+    pub(crate) fn at(
         model: &'a Model<f64, N>,
         input: &'a Input<f64, N>,
         (q, qd): (&Joints<f64, N>, &Joints<f64, N>),
@@ -178,7 +178,7 @@ impl<'a, const N: usize> Arm<'a, N> {
     /// within what holds it, or slips the way in which it is accelerated. With `ahead` \[s\] it is one of all joints, in their
     /// speeds after that time. Starting from all of them sticking, the first that violates its conditions changes its mode, until none is left: Murty's
     /// principal pivoting, which ends where the inertia matrix is positive definite.
-    pub(super) fn modes(
+    pub(crate) fn modes(
         &self,
         memory: &[States<f64>],
         ahead: Option<f64>,
@@ -269,7 +269,7 @@ impl<'a, const N: usize> Arm<'a, N> {
     ///
     /// * `ahead` - time after which joints that stick rest \[s\]; `None` for those that rest already
     #[inline(always)]
-    pub(super) fn solve(
+    pub(crate) fn solve(
         &self,
         memory: &[States<f64>],
         (modes, ahead): (&Modes<N>, Option<f64>),

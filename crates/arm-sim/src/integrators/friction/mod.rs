@@ -13,7 +13,7 @@
 mod gain;
 mod growth;
 mod hold;
-mod instant;
+pub(super) mod instant;
 mod locate;
 mod steady;
 
@@ -29,6 +29,7 @@ use steady::STILL;
 
 use crate::closed_chain::model::{Link, Model};
 use crate::closed_chain::state::{BaseMotion, Input, State};
+use crate::integrators::imex::imex;
 use crate::integrators::step::{
     self, AmbiguousFriction, Inputs, Memory, PROJECTIONS, remember, rk4,
 };
@@ -51,7 +52,9 @@ pub(crate) fn advance<const N: usize>(
     inputs: Inputs<f64, N>,
     at: (&mut State<f64, N>, &mut Memory<f64>),
 ) {
-    if model.has_dry {
+    if integrator == Integrator::Imex {
+        imex(model, h, &inputs, at);
+    } else if model.has_dry {
         step(model, integrator, h, inputs, at);
     } else {
         step::step(model, integrator, h, inputs, at);
@@ -71,7 +74,7 @@ fn step<const N: usize>(
         Integrator::SemiImplicitEuler => {
             implicit(model, (h, 1.0), [inputs.start, inputs.end], (state, memory));
         }
-        Integrator::Rk4 => {
+        Integrator::Rk4 | Integrator::Imex => {
             if !made_steadily(model, h, inputs, (state, memory)) {
                 switching(model, h, &inputs, (state, memory));
             }
@@ -326,7 +329,7 @@ fn implicit<const N: usize>(
 }
 
 /// Ends the run.
-fn stop<const N: usize>(
+pub(super) fn stop<const N: usize>(
     time: f64,
     (joint, gain): (usize, f64),
     (state, memory): (&mut State<f64, N>, &mut Memory<f64>),
@@ -336,7 +339,7 @@ fn stop<const N: usize>(
 }
 
 /// The drive at a fraction of a step: positions by Hermite's cubic, all else by the parabola through start, middle and end.
-fn input_at<const N: usize>(inputs: &Inputs<f64, N>, h: f64, x: f64) -> Input<f64, N> {
+pub(super) fn input_at<const N: usize>(inputs: &Inputs<f64, N>, h: f64, x: f64) -> Input<f64, N> {
     let Inputs { start, middle, end } = *inputs;
     if x <= 0.0 {
         return *start;
