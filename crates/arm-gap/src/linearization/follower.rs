@@ -3,9 +3,9 @@
 //! The scheme of the linearised run with a nonlinear equation in every step. What it gives is the run itself and, on top, what two
 //! coarse solutions differ by, so that their common error drops out.
 
-use arm_core::effect::{MAX_STATES, States, advance_states, any_state};
+use arm_core::effect::{MAX_STATES, Motion, States, advance_states, any_state};
 use arm_core::{Joints, Plane};
-use arm_sim::{Change, SimulationError};
+use arm_sim::{Change, SimulationError, SmoothFriction};
 use nalgebra::SMatrix;
 
 use crate::data::course::{Channels, Course};
@@ -13,7 +13,6 @@ use crate::hypothesis::Hypothesis;
 use crate::linearization::linearized_run::{ASTRAY, Linear};
 use crate::linearization::newton::{MissingTorque, newton, slide};
 use crate::linearization::plant::{Balance, Hand, Plant, State, balance, hands};
-use crate::linearization::sliding::Mode;
 use crate::measurement_model::start::held_at_start;
 
 impl<const N: usize> Linear<'_, N> {
@@ -109,10 +108,12 @@ pub(super) struct Follower<'l, 's, const N: usize> {
     other: SMatrix<f64, N, N>,
     /// What accelerations differed by from those that nothing pushes, in the last two steps.
     pushed: [Joints<f64, N>; 2],
-    /// What dry friction does in each joint.
-    modes: [Mode; N],
-    /// Whether some joint has dry friction that is set-valued, in the run or with the other plant.
-    dry: bool,
+    /// Speeds after the last step \[rad/s\].
+    speed: Joints<f64, N>,
+    /// Smooth friction in a step, of the other plant and of the run.
+    smooth: [Vec<SmoothFriction>; 2],
+    /// Whether some joint has dry friction, in the run or with the other plant.
+    rubs: bool,
 }
 
 /// One step of the way.
@@ -153,8 +154,9 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             change: Change::default(),
             other: SMatrix::zeros(),
             pushed: [zero; 2],
-            modes: [Mode::Sticks; N],
-            dry: plant.dry || line.own.plant.dry,
+            speed: zero,
+            smooth: [Vec::new(), Vec::new()],
+            rubs: [plant, &line.own.plant].iter().any(|p| p.dry || p.creeps),
         }
     }
 
@@ -173,7 +175,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         let moved = |angle: &Joints<f64, N>| state.moved(angle, &zero, &zero);
         let resting = self.plant.at_rest();
         let there = |angle: &Joints<f64, N>| balance(&resting, &moved(angle), hand, memory);
-        if !(self.dry || resting.dry) {
+        if !(self.rubs || resting.dry) {
             let missing = |angle: &Joints<f64, N>| {
                 let there = there(angle);
                 (error - there.torque, there)
@@ -195,7 +197,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             }
         };
         let slope = (line.slopes[0].stiffness, 1.0);
-        let slid = slide(zero, slope, &mut self.modes, missing)?;
+        let slid = slide(zero, slope, (&[], &zero), missing)?;
         self.change.q = slid.at;
         Some(slid.there)
     }
@@ -206,7 +208,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         let (angle, speed, reach) = self.change.coast(line.step);
         let slopes = &line.slopes[i];
         let free = -(line.inverse[i] * (slopes.damping * speed + slopes.stiffness * angle));
-        let start = match self.dry {
+        let start = match self.rubs {
             true => self.change.qdd,
             false => free + self.pushed[0] * 2.0 - self.pushed[1],
         };
@@ -232,19 +234,31 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         let Instant { i, reach, .. } = *instant;
         let error = line.error(i);
         let there = |next: &Joints<f64, N>| balance(plant, &instant.place(next), hand, memory);
-        let (next, found, exact) = if self.dry {
+        let (next, found, exact) = if self.rubs {
+            let [smooth, own] = &mut self.smooth;
+            renew(
+                smooth,
+                plant,
+                &instant.place(&instant.start).motion(),
+                memory,
+            );
+            renew(own, &line.own.plant, &line.balances[i].motion, &[]);
+            let speed = |next: &Joints<f64, N>| instant.state.qd + instant.speed_with(next);
             let missing = |next: &Joints<f64, N>| {
-                let there = there(next);
+                let (there, speed) = (there(next), speed(next));
+                let rubbing = SmoothFriction::sum(smooth, &speed).0;
                 MissingTorque {
-                    torque: error - there.torque,
-                    speed: instant.state.qd + instant.speed_with(next),
+                    torque: error - there.torque + rubbing,
+                    speed,
                     there,
                 }
             };
-            let own = line.slopes[i].of_step(line.step);
-            let slope = (own + self.other, reach);
-            let slid = slide(instant.start, slope, &mut self.modes, missing)?;
+            let (_, steep) = SmoothFriction::sum(own, &instant.state.qd);
+            let own = line.slopes[i].of_step(line.step) - SMatrix::from_diagonal(&(steep * reach));
+            let (slope, near) = ((own + self.other, reach), self.speed);
+            let slid = slide(instant.start, slope, (smooth, &near), missing)?;
             self.other = slid.slope - own;
+            self.speed = slid.speed;
             (slid.at, slid.there, slid.exact)
         } else {
             let missing = |next: &Joints<f64, N>| {
@@ -264,5 +278,18 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             qdd: next,
         };
         Some((found, exact))
+    }
+}
+
+/// Takes the smooth friction of a plant in a motion.
+fn renew<const N: usize>(
+    smooth: &mut Vec<SmoothFriction>,
+    plant: &Plant<N>,
+    motion: &Motion<f64, N>,
+    memory: &[States<f64>],
+) {
+    smooth.clear();
+    if plant.creeps {
+        smooth.extend(SmoothFriction::among(&plant.resisting, motion, memory));
     }
 }

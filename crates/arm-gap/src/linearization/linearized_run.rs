@@ -13,7 +13,6 @@ use crate::data::session::Session;
 use crate::hypothesis::Hypothesis;
 use crate::linearization::origin::Origin;
 use crate::linearization::plant::{Balance, Hand, Plant, State, balance, hands};
-use crate::linearization::sliding::Mode;
 
 /// The instants at which a run is recorded and solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +38,15 @@ impl Grid {
                 stride: (rate / Self::RATE) as usize,
             },
         }
+    }
+}
+
+/// The direction of a speed; zero for a joint at rest.
+fn direction(speed: f64) -> f64 {
+    match speed {
+        v if v > 0.0 => 1.0,
+        v if v < 0.0 => -1.0,
+        _ => 0.0,
     }
 }
 
@@ -204,7 +212,7 @@ impl<'a, const N: usize> Linear<'a, N> {
 
     fn differentiate(&mut self, i: usize, memory: &[States<f64>]) {
         let (state, hand, middle) = (self.states[i], self.hands[i], &self.balances[i]);
-        let way = Joints::from_fn(|j, _| Mode::of(state.qd[j]).way());
+        let way = state.qd.map(direction);
         let held: [bool; N] = std::array::from_fn(|j| middle.friction[j] > 0.0 && way[j] == 0.0);
         let left_over = |there: &Balance<N>| there.torque + there.friction.component_mul(&way);
         let at = [state.q, state.qd, state.qdd];

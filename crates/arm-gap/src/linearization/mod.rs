@@ -7,4 +7,3 @@ pub(crate) mod linearized_torques;
 mod newton;
 pub(crate) mod origin;
 mod plant;
-mod sliding;

@@ -1,10 +1,10 @@
 //! Newton's method for the equation of motion at one instant.
 
 use arm_core::Joints;
+use arm_sim::{ImplicitFriction, SmoothFriction};
 use nalgebra::SMatrix;
 
 use crate::linearization::plant::Balance;
-use crate::linearization::sliding::{LinearStep, Mode};
 
 /// The unknown at which nothing is missing, or as little as can be.
 pub(super) struct Solved<const N: usize> {
@@ -112,12 +112,12 @@ pub(super) struct MissingTorque<const N: usize> {
 /// linear problem.
 ///
 /// * `slope` - torque per unit of acceleration, and `reach` the change of speed that it makes \[s\]
-/// * `modes` - what the friction of each joint did before, and does at the solution
+/// * `smooth`, `near` - smooth friction, and speeds near which joints end \[rad/s\]
 /// * `missing` - what is missing at accelerations
 pub(super) fn slide<const N: usize>(
     start: Joints<f64, N>,
     (mut slope, reach): (SMatrix<f64, N, N>, f64),
-    modes: &mut [Mode; N],
+    (smooth, near): (&[SmoothFriction], &Joints<f64, N>),
     missing: impl Fn(&Joints<f64, N>) -> MissingTorque<N>,
 ) -> Option<Slid<N>> {
     /// Increment of speed for a difference quotient \[rad/s\].
@@ -128,7 +128,7 @@ pub(super) fn slide<const N: usize>(
     const ROUNDS: usize = 14;
     /// Rounds after which the slope is taken anew, for a contact that opens and the end of a range.
     const RENEWED: usize = 6;
-    let (mut at, mut now) = (start, missing(&start));
+    let (mut at, mut now, mut speed) = (start, missing(&start), *near);
     let mut answered = f64::INFINITY;
     for round in 0..ROUNDS {
         if round == RENEWED {
@@ -141,15 +141,13 @@ pub(super) fn slide<const N: usize>(
                 );
             }
         }
-        let step = LinearStep {
-            slope: &slope,
-            missing: now.torque,
-            friction: now.there.friction,
-            speed: now.speed,
-            reach,
+        let friction = ImplicitFriction {
+            set_valued: now.there.friction,
+            smooth,
         };
-        let (change, found) = step.solve(*modes)?;
-        *modes = found;
+        let end = friction.solve(&(slope / reach), (&now.speed, &now.torque), &speed)?;
+        speed = end.speed;
+        let change = (speed - now.speed) / reach;
         answered = (slope * change).amax();
         if !answered.is_finite() {
             return None;
@@ -165,6 +163,7 @@ pub(super) fn slide<const N: usize>(
     }
     Some(Slid {
         at,
+        speed,
         there: now.there,
         slope,
         exact: answered < TOLERANCES.1,
@@ -174,6 +173,8 @@ pub(super) fn slide<const N: usize>(
 /// A solution with dry friction, with the slope that led there.
 pub(super) struct Slid<const N: usize> {
     pub at: Joints<f64, N>,
+    /// Zero where set-valued friction holds a joint \[rad/s\].
+    pub speed: Joints<f64, N>,
     pub there: Balance<N>,
     pub slope: SMatrix<f64, N, N>,
     pub exact: bool,
@@ -231,16 +232,15 @@ mod tests {
                 speed: next * 0.01,
                 there: balance(1.0),
             };
-            let mut modes = [Mode::Sticks];
-            let slope = (SMatrix::identity(), 0.01);
-            let slid = slide(Joints::zeros(), slope, &mut modes, missing).expect("numbers");
+            let (slope, still) = ((SMatrix::identity(), 0.01), Joints::zeros());
+            let slid = slide(still, slope, (&[], &still), missing).expect("numbers");
             assert!(slid.exact);
-            (slid.at[0], modes[0])
+            (slid.at[0], slid.speed[0])
         };
-        assert_eq!(slid(0.9), (0.0, Mode::Sticks));
-        let (faster, mode) = slid(1.5);
-        assert!((faster - 0.5).abs() < 1e-7 && mode == Mode::Slips(1));
-        let (faster, mode) = slid(-1.5);
-        assert!((faster + 0.5).abs() < 1e-7 && mode == Mode::Slips(-1));
+        assert_eq!(slid(0.9), (0.0, 0.0));
+        for (pull, faster) in [(1.5, 0.5), (-1.5, -0.5)] {
+            let (found, speed) = slid(pull);
+            assert!((found - faster).abs() < 1e-7 && (speed - 0.01 * faster).abs() < 1e-9);
+        }
     }
 }

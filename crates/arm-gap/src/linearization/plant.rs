@@ -10,7 +10,7 @@ use arm_sim::SimulationError;
 use crate::data::course::Course;
 use crate::data::session::Session;
 use crate::hypothesis::Hypothesis;
-use crate::measurement_model::start::{at_rest, is_set_valued_friction};
+use crate::measurement_model::start::{at_rest, creeps, is_set_valued_friction};
 
 /// What moves a led arm, besides its own state.
 pub(super) struct Plant<const N: usize> {
@@ -23,8 +23,10 @@ pub(super) struct Plant<const N: usize> {
     pub sensing: Vec<Effect<f64>>,
     /// Whether the forces through the joints count.
     pub feels_force: bool,
-    /// Whether some joint has dry friction that is set-valued.
+    /// Whether some joint has dry friction that is set-valued,
     pub dry: bool,
+    /// and whether some has smooth friction.
+    pub creeps: bool,
 }
 
 impl<const N: usize> Plant<N> {
@@ -44,6 +46,7 @@ impl<const N: usize> Plant<N> {
             chain: setup.chain()?,
             contact: setup.contact,
             dry: resisting.iter().any(is_set_valued_friction),
+            creeps: resisting.iter().any(creeps),
             feels_force: setup.base_motion != [0.0; 2]
                 || resisting.iter().any(|e| e.kind.feels_force()),
             setup,
@@ -58,6 +61,7 @@ impl<const N: usize> Plant<N> {
             resisting: Vec::new(),
             sensing: Vec::new(),
             dry: false,
+            creeps: false,
             ..*self
         }
     }
@@ -67,6 +71,7 @@ impl<const N: usize> Plant<N> {
         let resting = at_rest(&self.resisting);
         Self {
             dry: resting.iter().any(is_set_valued_friction),
+            creeps: false,
             resisting: resting,
             sensing: Vec::new(),
             ..*self

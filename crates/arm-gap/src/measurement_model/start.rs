@@ -228,6 +228,11 @@ pub(crate) fn is_set_valued_friction(effect: &Effect<f64>) -> bool {
     effect.on && effect.is_dry() && effect.parameters[0] > 0.0
 }
 
+/// Whether an effect is smooth dry friction, or has some, that acts.
+pub(crate) fn creeps(effect: &Effect<f64>) -> bool {
+    effect.on && effect.kind.smoothed_by().is_some() && !effect.is_dry()
+}
+
 /// The joints that dry friction holds where a run starts: what the handle leaves free, the last ones first.
 pub(crate) fn held_at_start<const N: usize>(friction: &Joints<f64, N>) -> [bool; N] {
     let mut held = [false; N];

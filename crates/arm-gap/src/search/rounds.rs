@@ -160,6 +160,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         progress: Progress<'_>,
     ) -> Result<SearchState<'a, N>, GapError> {
         state.is_back(self.dry);
+        let mut has_barred = false;
         for round in 0..MOST {
             progress("asking the catalogue", 0.1 + 0.1 * round as f64)?;
             let library = Library::build(self, &state.point, periodic)?;
@@ -190,8 +191,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             }
             if state.is_back(self.dry) {
                 state.search_trace.pop();
-                // What stands in their place may be behind it.
-                if self.repeated && state.bar_lost(asked) {
+                // What stands in their place may be behind it; where nothing was, what is barred next would not have stayed either.
+                if self.repeated && !has_barred && state.bar_lost(asked) {
+                    has_barred = true;
                     continue;
                 }
                 break;
