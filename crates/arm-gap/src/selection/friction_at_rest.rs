@@ -118,17 +118,19 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         cheapest(present, (laws, speeds), simulated)
     }
 
-    /// The same with a named law that sticks, where that costs less once its other numbers are fitted anew.
+    /// The same with a named law that sticks, where that does not cost more by the price of a shape once its other numbers are fitted anew: a
+    /// joint that creeps slowly enough hardly differs from one that sticks.
     fn sticking(&self, fitted: FittedHypothesis<N>, slot: usize) -> FittedHypothesis<N> {
         let mut sticking = fitted.clone();
         let named = &mut sticking.hypothesis.named[slot];
         if let Some(smoothing) = named.kind.smoothed_by() {
             named.parameters[smoothing] = 0.0;
         }
-        let question = sticking.asked[slot].clone().at_rest_as(named);
-        sticking.asked[slot] = question;
+        let own = &fitted.asked[slot..=slot];
+        sticking.asked[slot] = own[0].clone().at_rest_as(named);
+        let more = self.price_of_shapes(own) - self.price_of_shapes(&sticking.asked[slot..=slot]);
         match self.settle(sticking.hypothesis, sticking.asked) {
-            Ok((refitted, _)) if is_cheaper(&refitted, &fitted) => refitted,
+            Ok((refitted, _)) if refitted.cost < fitted.cost + more => refitted,
             _ => fitted,
         }
     }
