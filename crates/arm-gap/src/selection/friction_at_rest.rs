@@ -1,6 +1,6 @@
 //! Choice between dry friction that sticks and dry friction that creeps at rest, by whole trials.
 
-use arm_core::effect::Kind;
+use arm_core::effect::{Effect, Kind};
 
 use crate::GapError;
 use crate::candidates::refined_shapes::CREEP;
@@ -38,10 +38,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             return Ok(settled);
         }
         let before = &settled.0;
+        let slow = |&slot: &usize| is_slow(&before.hypothesis.named[slot]);
+        let (slow, fast): (Vec<_>, Vec<_>) = named.into_iter().partition(slow);
+        // Whole trials also show where a run starts, which a joint that sticks keeps: in motion, one that creeps so slowly does not differ.
+        let stuck = slow
+            .iter()
+            .fold(before.clone(), |best, &slot| self.sticking(best, slot));
         let chosen = self.over_whole_trials(|whole| {
-            let smoothed = whole.smoothed(before, &base);
-            named
-                .iter()
+            let smoothed = whole.smoothed(&stuck, &base);
+            fast.iter()
                 .fold(smoothed, |best, &slot| whole.sticking(best, slot))
         });
         if chosen.hypothesis == before.hypothesis {
@@ -174,6 +179,12 @@ fn next_smoothing(speeds: &[f64], present: f64, upwards: bool) -> Option<f64> {
         true => speeds.find(|&s| s > present),
         false => speeds.rfind(|&s| s < present),
     }
+}
+
+/// Whether a law creeps more slowly than at any speed that is tried.
+fn is_slow(effect: &Effect<f64>) -> bool {
+    let speed = Kind::smoothed_by(effect.kind).map(|at| effect.parameters[at]);
+    speed.is_some_and(|speed| speed < SMOOTHING[1])
 }
 
 /// Whether another fit costs less by more than nothing.
