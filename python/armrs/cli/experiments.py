@@ -46,6 +46,13 @@ Accuracy = Annotated[
     float | None,
     typer.Option(help="Largest error of an angle [rad], instead of a step: a step that keeps it is found by comparing runs."),
 ]
+NativeIntegrator = Annotated[
+    Integrator | None,
+    typer.Option(
+        "--integrator",
+        help="Of the native engine: fourth order (when absent), semi-implicit of first order, or imex, implicit in friction.",
+    ),
+]
 DrivingTrial = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Measured trial, CSV or Parquet, whose robot angles (or joint torques) drive the arm."),
@@ -66,9 +73,7 @@ def simulate(
     rate_hz: Annotated[
         float, typer.Option(help="Recorded samples per second [Hz], 0.001 or more; the interval is a whole number of steps.")
     ] = 50.0,
-    integrator: Annotated[
-        Integrator | None, typer.Option(help="Of the native engine: fourth order (when absent), semi-implicit of first order, or imex, implicit in friction.")
-    ] = None,
+    integrator: NativeIntegrator = None,
     coupling: Annotated[Coupling, typer.Option(help="How the handle holds the tip.")] = Coupling.compliant,
     duration_s: Annotated[
         float | None,

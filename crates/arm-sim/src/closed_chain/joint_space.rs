@@ -185,12 +185,12 @@ impl<T: Scalar, const N: usize> BiasAndJacobian<T, N> {
 }
 
 /// The inertia matrix with a base that moves with the first joint.
-pub(crate) fn with_base<T: Scalar, const N: usize>(
-    mut inertia: JointMatrix<T, N>,
+pub(crate) fn inertia_with_base<T: Scalar, const N: usize>(
     chain: &Chain<T, N>,
     base: Option<&MovingBase<T>>,
     pose: &Pose<T, N>,
 ) -> JointMatrix<T, N> {
+    let mut inertia = inertia(chain, pose);
     if let Some(base) = base {
         let [uy, uz] = base.per_angle;
         let rows = first_moment_rows(chain, pose);
@@ -214,7 +214,7 @@ impl<T: Scalar, const N: usize> JointSpaceEquation<T, N> {
         let rate = jacobian_rate(chain, pose, qd);
         let bias = inverse_dynamics(chain, pose, qd, &Joints::repeat(T::ZERO));
         let mut terms = Self {
-            inertia: with_base(inertia(chain, pose), chain, base, pose),
+            inertia: inertia_with_base(chain, base, pose),
             given: BiasAndJacobian::new(bias, chain, (base, placement), (pose, qd)),
             jacobian_rate: [0, 1].map(|row| {
                 let mut sum = T::ZERO;

@@ -5,13 +5,14 @@ use arm_core::effect::{
 };
 use arm_core::{
     Chain, Contact, Invalid, JointMatrix, Joints, Load, Placement, Plane, Pose, Products,
-    Resistance, Scalar, Setup, accelerations, gravity, inertia, joint_force, kinetic_energy,
+    Resistance, Scalar, Setup, accelerations, gravity, joint_force, kinetic_energy,
     potential_energy, tip, tip_velocity,
 };
 
 use crate::closed_chain::branch_free::{BranchFree, affine, contact_gap, load, pull};
 use crate::closed_chain::joint_space::{
-    BiasAndJacobian, JointSpaceEquation, MovingBase, add_inertia, first_moment_rows, with_base,
+    BiasAndJacobian, JointSpaceEquation, MovingBase, add_inertia, first_moment_rows,
+    inertia_with_base,
 };
 use crate::closed_chain::state::{Input, Outcome, State, difference, powers, sum};
 
@@ -40,7 +41,7 @@ pub(crate) struct Model<T, const N: usize> {
     /// The joint effects that are switched on.
     pub effects: Vec<Effect<T>>,
     /// Sums over those that are linear in the motion of their joint: constant, to the angle, to the speed.
-    affine: [[T; 3]; N],
+    pub affine: [[T; 3]; N],
     /// Effects that are not in the sums. If one of them has states, the full list with the summed effects switched off: an index selects
     /// the states.
     others: Vec<Effect<T>>,
@@ -285,11 +286,6 @@ impl<T: Scalar, const N: usize> Model<T, N> {
             resisting_torque(&self.others, motion, memory)
         };
         *total = sum(total, &others);
-    }
-
-    /// Viscosity of each joint \[N m s/rad\].
-    pub fn viscosity(&self) -> Joints<T, N> {
-        Joints::from_fn(|j, _| self.affine[j][2])
     }
 
     /// Largest torque of the set-valued dry friction of each joint \[N m\].
@@ -550,12 +546,7 @@ impl<T: Scalar, const N: usize> Model<T, N> {
 
     /// The inertia matrix in joint coordinates \[kg m²\].
     pub fn inertia(&self, pose: &Pose<T, N>) -> JointMatrix<T, N> {
-        with_base(
-            inertia(&self.chain, pose),
-            &self.chain,
-            self.base.as_ref(),
-            pose,
-        )
+        inertia_with_base(&self.chain, self.base.as_ref(), pose)
     }
 
     /// The equation of motion in joint coordinates.

@@ -2,8 +2,8 @@
 
 use crate::closed_chain::branch_free::BranchFree;
 use crate::closed_chain::state::{Outcome, State};
+use crate::integrators::advance::advance;
 use crate::integrators::divided_step::step_in_pieces;
-use crate::integrators::friction::advance;
 use crate::integrators::input_buffer::{Ahead, InputBuffer};
 use crate::integrators::step::{Memory, Stages, fourth_order};
 use crate::preparation::prepared_run::Prepared;

@@ -2,7 +2,7 @@
 
 use crate::closed_chain::state::{Input, State};
 use crate::experiment::discontinuities::ON_GRID;
-use crate::integrators::friction::advance;
+use crate::integrators::advance::advance;
 use crate::integrators::step::{Inputs, Memory};
 use crate::preparation::prepared_run::Prepared;
 

@@ -45,7 +45,7 @@ pub(crate) fn imex<const N: usize>(
     };
     let reach = MIDDLE * h;
     let inertia = model.inertia(&Pose::new(&q));
-    let viscosity = model.viscosity();
+    let viscosity = Joints::from_fn(|j, _| model.affine[j][2]);
     let rig = Rig {
         yielding: inertia
             .try_inverse()

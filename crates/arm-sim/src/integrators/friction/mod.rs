@@ -29,10 +29,7 @@ use steady::STILL;
 
 use crate::closed_chain::model::{Link, Model};
 use crate::closed_chain::state::{BaseMotion, Input, State};
-use crate::integrators::imex::imex;
-use crate::integrators::step::{
-    self, AmbiguousFriction, Inputs, Memory, PROJECTIONS, remember, rk4,
-};
+use crate::integrators::step::{AmbiguousFriction, Inputs, Memory, PROJECTIONS, remember, rk4};
 use crate::{Handle, Integrator};
 use arm_core::effect::States;
 
@@ -43,27 +40,9 @@ const RESOLVED: f64 = 0.3;
 /// Shortest part of a step that is made for that, as a fraction of the step.
 const SHORTEST: f64 = 1.0 / 128.0;
 
-/// Advances a state by one step of length `h`, with dry friction where there is any.
-#[inline(always)]
-pub(crate) fn advance<const N: usize>(
-    model: &Model<f64, N>,
-    integrator: Integrator,
-    h: f64,
-    inputs: Inputs<f64, N>,
-    at: (&mut State<f64, N>, &mut Memory<f64>),
-) {
-    if integrator == Integrator::Imex {
-        imex(model, h, &inputs, at);
-    } else if model.has_dry {
-        step(model, integrator, h, inputs, at);
-    } else {
-        step::step(model, integrator, h, inputs, at);
-    }
-}
-
 /// Advances a state by one step of length `h` in which there is dry friction.
 #[inline(never)]
-fn step<const N: usize>(
+pub(super) fn step<const N: usize>(
     model: &Model<f64, N>,
     integrator: Integrator,
     h: f64,
