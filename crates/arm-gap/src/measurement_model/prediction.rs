@@ -223,13 +223,13 @@ fn is_steep<const N: usize>(experiment: &Experiment<N>, q: &Joints<f64, N>) -> b
     viscous.chain(smooth).sum::<f64>() * STEPS[0] > FOLLOWED
 }
 
-/// Longest step with which a method of second order follows the vibration of the arm on its contact \[s\]: 0.3 of a radian a step, in which it
-/// gains 1.5 % of that.
+/// Longest step at which [`Integrator::Imex`] follows the vibration of the arm on its contact \[s\]: `ωh = 0.3`, where the phase error is 0.2 %
+/// without damping.
 fn longest_second_order_step<const N: usize>(
     experiment: &Experiment<N>,
     q: &Joints<f64, N>,
 ) -> f64 {
-    /// The same as a share of the step that is stable with the fourth-order method, 2.61 radians.
+    /// Ratio of that `ωh` to the stability limit of the fourth-order method.
     const SHARE: f64 = 0.3 / 2.61;
     let setup = experiment.altered();
     let stable = setup.and_then(|setup| longest_step_on_contact(&setup, [q]));

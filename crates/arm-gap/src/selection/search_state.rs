@@ -69,8 +69,8 @@ impl<const N: usize> SearchState<'_, N> {
 
     /// Whether it has been here before and was hardly worse off: from here it would go round in a circle.
     pub fn is_back(&mut self, dry: [bool; N]) -> bool {
-        /// Share of the cost by which the same names must have become better to be tested again: fits of joints that stick end here and
-        /// there.
+        /// Share of the cost by which the same names must have become better to be tested again: fits with joints that stick end in
+        /// different minima.
         const BETTER: f64 = 0.05;
         let FittedHypothesis { asked, cost, .. } = &self.current;
         let enough = self.current.enough().max(BETTER * cost);

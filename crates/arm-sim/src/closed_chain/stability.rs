@@ -72,7 +72,7 @@ fn yielding<const N: usize>(terms: &JointSpaceEquation<f64, N>) -> [Plane<f64>; 
     unit.map(|f| terms.tip_rate(&terms.accelerate(&terms.tip_torque(f))))
 }
 
-/// A tip on its contact, as [`Integrator::Imex`] takes it: `ẍ = −by_place x − by_speed ẋ`, with forces explicit and the speed implicit.
+/// A tip on its contact, as [`Integrator::Imex`] takes it: `ẍ = −by_place x − by_speed ẋ`, with explicit contact forces; the positions follow the implicit speeds of the stages.
 struct Imex {
     by_place: SMatrix<f64, 2, 2>,
     by_speed: SMatrix<f64, 2, 2>,
@@ -92,7 +92,7 @@ impl Imex {
         }
     }
 
-    /// Whether a vibration grows with a step: by the size of a high power of what a step makes of place and speed.
+    /// Whether the spectral radius of the amplification matrix exceeds one, estimated from its 2²⁴-th power.
     fn grows(&self, h: f64) -> bool {
         /// Squarings, and growth in each step that is rounding.
         const SQUARINGS: u32 = 24;

@@ -152,7 +152,7 @@ impl<const N: usize> Rig<'_, N> {
             });
             let arm = Arm::at(model, input, (q, &at.speed));
             let solved = arm.solve(memory, (&modes, None));
-            // What holds a joint takes itself out; one that slips does so against the friction of the start.
+            // The friction of a joint that sticks cancels; one that slips is corrected from its friction at the start of the step.
             implicit += Joints::from_fn(|j, _| match modes[j] {
                 Mode::Sticks => solved.dry.torque[j],
                 Mode::None | Mode::Slips(_) => at.set_valued[j],

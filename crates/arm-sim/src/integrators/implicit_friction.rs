@@ -80,7 +80,7 @@ pub struct WithFriction<const N: usize> {
     pub speed: Joints<f64, N>,
     /// Torques of set-valued friction \[N m\].
     pub set_valued: Joints<f64, N>,
-    /// Whether every law is obeyed.
+    /// Whether the iteration converged; if not, the speeds are those of its last step.
     pub exact: bool,
 }
 
@@ -96,7 +96,7 @@ impl<const N: usize> ImplicitFriction<'_, N> {
     /// ```
     /// use arm_core::Joints;
     /// use arm_sim::{ImplicitFriction, SmoothFriction};
-    /// // 2 kg m² that turn with 0.5 rad/s, and lose 0.1 N m for a second: set-valued friction, and smooth friction as large.
+    /// // An inertia of 2 kg m² turning at 0.5 rad/s, braked by 0.1 N m for 1 s: by set-valued friction, and by smooth friction.
     /// let (inertia, from) = (nalgebra::Matrix1::new(2.0), Joints::<f64, 1>::repeat(0.5));
     /// let smooth = [SmoothFriction { joint: 0, most: 0.1, smoothing: 1e-4 }];
     /// let none = Joints::zeros();
