@@ -50,7 +50,7 @@ NativeIntegrator = Annotated[
     Integrator | None,
     typer.Option(
         "--integrator",
-        help="Of the native engine: rk4 (default, fourth order), euler (semi-implicit, first order), imex (second order, implicit friction).",
+        help="Native engine: rk4 (default, fourth order), euler (semi-implicit, first order), imex (second order, implicit friction).",
     ),
 ]
 DrivingTrial = Annotated[
