@@ -7,6 +7,7 @@ use crate::candidates::refined_shapes::CREEP;
 use crate::data::session::ComparisonMode;
 use crate::fitting::fit::FittedHypothesis;
 use crate::hypothesis::{Hypothesis, Target};
+use crate::measurement_model::start::creeps;
 use crate::prepared_session::PreparedSession;
 use crate::selection::search_state::Settled;
 
@@ -196,7 +197,7 @@ fn is_cheaper<const N: usize>(other: &FittedHypothesis<N>, present: &FittedHypot
 fn creeping<const N: usize>(fitted: &FittedHypothesis<N>) -> Vec<usize> {
     let named = fitted.hypothesis.named.iter().enumerate();
     named
-        .filter(|(_, effect)| effect.kind.smoothed_by().is_some() && !effect.is_dry())
+        .filter(|(_, effect)| creeps(effect))
         .map(|(slot, _)| slot)
         .collect()
 }

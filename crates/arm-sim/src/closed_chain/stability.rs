@@ -208,16 +208,15 @@ pub(crate) fn check<const N: usize>(
     let Link::Compliant(contact) = &model.link else {
         return Ok(());
     };
+    let imex = (integrator == Integrator::Imex).then(|| Imex::at(contact, model, q));
+    if imex.as_ref().is_some_and(|imex| !imex.grows(dt)) {
+        return Ok(());
+    }
     let vibration = Vibration::at(contact, model, q);
-    let largest = if integrator == Integrator::Imex {
-        let imex = Imex::at(contact, model, q);
-        if !imex.grows(dt) {
-            return Ok(());
-        }
-        imex.largest_step(dt)
-    } else {
-        vibration.largest_step(integrator)
-    };
+    let largest = imex.map_or_else(
+        || vibration.largest_step(integrator),
+        |imex| imex.largest_step(dt),
+    );
     if dt <= largest {
         return Ok(());
     }

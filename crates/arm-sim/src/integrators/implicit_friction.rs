@@ -59,7 +59,7 @@ impl SmoothFriction {
 }
 
 /// Position of the smoothing of an effect that is smooth dry friction, or has some.
-pub(crate) fn smoothed_by(effect: &Effect<f64>) -> Option<usize> {
+fn smoothed_by(effect: &Effect<f64>) -> Option<usize> {
     let smoothing = effect.kind.smoothed_by()?;
     (effect.on && effect.parameters[smoothing] > 0.0).then_some(smoothing)
 }

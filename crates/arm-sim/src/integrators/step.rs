@@ -76,9 +76,7 @@ impl<T: Scalar> Memory<T> {
             ambiguous_friction: None,
         }
     }
-}
 
-impl<T: Scalar> Memory<T> {
     /// Brings the states of effects to a stage, `ahead` of the start along the motion there.
     pub fn advance_to_stage<const N: usize>(
         &mut self,
