@@ -46,6 +46,7 @@ fn _armrs(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(custom_effects::declare, m)?)?;
     m.add_function(wrap_pyfunction!(simulation::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(simulation::simulate_accurately, m)?)?;
+    m.add_function(wrap_pyfunction!(simulation::energy_balance, m)?)?;
     m.add_function(wrap_pyfunction!(simulation::resolve, m)?)?;
     m.add_function(wrap_pyfunction!(simulation::simulate_in_pieces, m)?)?;
     m.add_function(wrap_pyfunction!(laboratory::control, m)?)?;

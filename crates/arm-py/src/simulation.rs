@@ -120,7 +120,7 @@ pub fn simulate<'py>(
         let engine = settings.engine()?;
         let outcome = py.detach(|| arm_sim::simulate_with(engine, &experiment));
         crate::custom_effects::failed()?;
-        recorded(py, &experiment, &outcome.map_err(simulation)?, sensing)
+        recorded(py, &experiment, outcome.map_err(simulation)?, sensing)
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, sensing.as_ref())))
 }
@@ -129,18 +129,21 @@ pub fn simulate<'py>(
 fn recorded<const N: usize>(
     py: Python<'_>,
     experiment: &Experiment<N>,
-    recording: &arm_sim::Recording<N>,
+    recording: arm_sim::Recording<N>,
     sensing: Option<&(Sensing, Vec<u64>)>,
 ) -> PyResult<Recorded> {
     let mut readings = Vec::new();
     if let Some((sensing, seeds)) = sensing {
         for &seed in seeds {
             let sensors = sensing.sensors::<N>(seed);
-            let read = sensors.read(experiment, recording);
-            readings.push(Readings::of(py, &read.map_err(simulation)?)?);
+            let read = sensors.read(experiment, &recording);
+            readings.push(Readings::of(py, read.map_err(simulation)?)?);
         }
     }
-    Recorded::of(py, &Piece::from(recording), readings)
+    let piece = Piece::from(&recording);
+    arm_sim::definite(&piece).map_err(simulation)?;
+    let energy_error = piece.energy_error();
+    Recorded::of(py, recording, energy_error, readings)
 }
 
 /// Simulates an experiment so that angles are right to an accuracy [rad]; the recording, its step [s] and the estimated error [rad].
@@ -167,7 +170,7 @@ pub fn simulate_accurately<'py>(
         crate::custom_effects::failed()?;
         let (recording, resolved) = outcome.map_err(simulation)?;
         experiment.dt = resolved.dt;
-        let recorded = recorded(py, &experiment, &recording, sensing)?;
+        let recorded = recorded(py, &experiment, recording, sensing)?;
         Ok((recorded, resolved.dt, resolved.error))
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings, accuracy), sensing.as_ref()))
@@ -228,8 +231,10 @@ pub fn simulate_in_pieces<'py>(
         let mut raised = None;
         let mut give = |piece: &Piece<'_, N>| {
             let given = Python::attach(|py| {
-                take.call1(py, (Recorded::of(py, piece, Vec::new())?,))
-                    .map(|_| ())
+                arm_sim::definite(piece).map_err(simulation)?;
+                let (recording, readings) = (piece.recording.clone(), Vec::new());
+                let recorded = Recorded::of(py, recording, piece.energy_error(), readings)?;
+                take.call1(py, (recorded,)).map(|_| ())
             });
             given.map_or_else(
                 |error| {
@@ -246,6 +251,49 @@ pub fn simulate_in_pieces<'py>(
         outcome.map_err(simulation)
     }
     each_short_length!(&rig.arm.chain, c => run(py, c, rig, (&drive, &settings), (samples, &take)))
+}
+
+/// What of the energy of a piece of a run is not accounted for: the largest error, the sum of all exchanged and the largest stored energy
+/// [J]; and the energies at its last sample, for the next piece.
+///
+/// * `before` - the last of these of the piece before
+#[pyfunction]
+#[pyo3(signature = (columns, before=None))]
+pub fn energy_balance(
+    columns: &Bound<'_, PyAny>,
+    before: Option<[f64; 5]>,
+) -> PyResult<(f64, f64, f64, [f64; 5])> {
+    const STORED: [&str; 3] = ["energy.kinetic", "energy.potential", "energy.contact"];
+    const WORK: [&str; 4] = ["work.handle", "work.drive", "work.resisted", "work.damped"];
+    let column = |name| {
+        columns
+            .get_item(name)?
+            .extract::<PyReadonlyArray1<'_, f64>>()
+    };
+    let largest = |most: f64, v: &f64| {
+        if v.is_nan() {
+            f64::NAN
+        } else {
+            most.max(v.abs())
+        }
+    };
+    let most = |name| PyResult::Ok(column(name)?.as_array().iter().fold(0.0, largest));
+    let error = most("energy_error")?;
+    let mut stored = 0.0;
+    for name in STORED {
+        stored = f64::max(stored, most(name)?);
+    }
+    let (mut exchanged, mut last) = (0.0, [0.0; 5]);
+    for (i, name) in STORED[..1].iter().chain(&WORK).enumerate() {
+        let flow = column(name)?;
+        let mut then = before.map(|all| all[i]);
+        for &now in flow.as_array() {
+            exchanged += f64::abs(now - then.unwrap_or(now));
+            then = Some(now);
+        }
+        last[i] = then.unwrap_or(0.0);
+    }
+    Ok((error, exchanged, stored, last))
 }
 
 /// The experiment that Python describes.

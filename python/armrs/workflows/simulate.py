@@ -275,10 +275,9 @@ def runaway(pieces: Iterable[Simulated]) -> tuple[str, ...]:
     """Return a line where a joint turns faster than a led arm does."""
     fastest, first = 0.0, None
     for piece in pieces:
-        speed = np.abs(piece.qd)
-        fastest = max(fastest, float(speed.max()))
+        fastest = max(fastest, float(piece.qd.max()), -float(piece.qd.min()))
         if first is None and fastest > RUNAWAY:
-            first = piece.t[np.argmax((speed > RUNAWAY).any(axis=1))]
+            first = piece.t[np.argmax((np.abs(piece.qd) > RUNAWAY).any(axis=1))]
     if first is None:
         return ()
     return (f"the arm runs away: from {first:.3g} s on a joint turns faster than {RUNAWAY:g} rad/s, at most {fastest:.4g} rad/s",)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+
+from .. import _armrs
 
 WARNED = 1e-3
 """Share from which an error is warned of."""
@@ -71,16 +73,10 @@ class EnergyBalance:
 def energy_balance(pieces: Iterable[Piece]) -> EnergyBalance:
     """Return the energy balance of a run from its pieces, in order."""
     error = exchanged = stored = 0.0
-    before: np.ndarray | None = None
+    last: Sequence[float] | None = None
     for piece in pieces:
-        columns = piece.columns
-        error = max(error, float(np.abs(columns["energy_error"]).max()))
-        stored = max(stored, *(float(np.abs(columns[f"energy.{part}"]).max()) for part in ("kinetic", "potential", "contact")))
-        flows = np.stack([columns["energy.kinetic"], *(columns[f"work.{part}"] for part in ("handle", "drive", "resisted", "damped"))])
-        if before is not None:
-            flows = np.concatenate([before, flows], axis=1)
-        exchanged += float(np.abs(np.diff(flows, axis=1)).sum())
-        before = flows[:, -1:]
+        off, flowed, most, last = _armrs.energy_balance(piece.columns, last)
+        error, exchanged, stored = max(error, off), exchanged + flowed, max(stored, most)
     return EnergyBalance(error, exchanged, stored)
 
 

@@ -1,21 +1,20 @@
 //! `Recording` and `Readings`: the samples of a run, and the sensor readings of it.
 
-use arm_sim::{Piece, Readings as Read, SimulationError};
-use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};
+use arm_sim::Readings as Read;
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
 
-use crate::errors::simulation;
-
 /// Values a sample as an array, `(n,)` or, of several a sample, `(n, width)`; `None` where there are none.
-fn array(py: Python<'_>, values: &[f64], width: Option<usize>) -> PyResult<Py<PyAny>> {
+fn array(py: Python<'_>, values: Vec<f64>, width: Option<usize>) -> PyResult<Py<PyAny>> {
     if values.is_empty() {
         return Ok(py.None());
     }
-    let flat = values.to_pyarray(py);
+    let count = values.len();
+    let flat = values.into_pyarray(py);
     Ok(match width {
         None => flat.into_any().unbind(),
-        Some(width) => flat.call_method1("reshape", (-1, width as isize))?.unbind(),
+        Some(width) => flat.reshape([count / width, width])?.into_any().unbind(),
     })
 }
 
@@ -62,14 +61,14 @@ pub struct Readings {
 
 impl Readings {
     /// What sensors read, in Python.
-    pub fn of<const N: usize>(py: Python<'_>, read: &Read<N>) -> PyResult<Self> {
+    pub fn of<const N: usize>(py: Python<'_>, read: Read<N>) -> PyResult<Self> {
         Ok(Self {
-            time: array(py, &read.time, None)?,
-            q: array(py, &read.q, Some(N))?,
-            force_on_arm: array(py, &read.force_on_arm, Some(2))?,
-            moment_on_arm: array(py, &read.moment_on_arm, None)?,
-            robot_q: array(py, &read.robot_q, Some(2))?,
-            tau: array(py, &read.torque, Some(N))?,
+            time: array(py, read.time, None)?,
+            q: array(py, read.q, Some(N))?,
+            force_on_arm: array(py, read.force_on_arm, Some(2))?,
+            moment_on_arm: array(py, read.moment_on_arm, None)?,
+            robot_q: array(py, read.robot_q, Some(2))?,
+            tau: array(py, read.torque, Some(N))?,
         })
     }
 }
@@ -134,30 +133,31 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// The samples of a piece of a run, and what was read of it.
+    /// The samples of a piece of a run, which are taken, and what was read of it.
+    ///
+    /// * `energy_error` - as of [`Piece::energy_error`]
     pub fn of<const N: usize>(
         py: Python<'_>,
-        piece: &Piece<'_, N>,
+        mut recording: arm_sim::Recording<N>,
+        energy_error: Vec<f64>,
         readings: Vec<Readings>,
     ) -> PyResult<Self> {
-        let recording = piece.recording;
         let columns = PyDict::new(py);
-        for (name, width, values) in recording.columns() {
+        for (name, width, values) in recording.columns_mut() {
             // Energies, works, time and the moment are numbers; everything else belongs to joints, axes or effects.
             let scalar = name == "time"
                 || name == "moment_on_arm"
                 || name.starts_with("energy")
                 || name.starts_with("work");
-            columns.set_item(name, array(py, values, (!scalar).then_some(width))?)?;
+            let values = array(py, std::mem::take(values), (!scalar).then_some(width))?;
+            columns.set_item(name, values)?;
         }
         let effects = recording.effects.iter();
         let effects = effects.map(|(kind, index)| (kind.info().kind.to_owned(), *index));
-        let energy_error = piece.energy_error().to_pyarray(py).unbind();
-        arm_sim::definite(piece).map_err(|error: SimulationError| simulation(error))?;
         Ok(Self {
             columns: PyMappingProxy::new(py, columns.as_mapping()).unbind(),
             effects: effects.collect(),
-            energy_error,
+            energy_error: energy_error.into_pyarray(py).unbind(),
             readings: PyTuple::new(py, readings)?.unbind(),
         })
     }

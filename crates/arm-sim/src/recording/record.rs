@@ -96,6 +96,43 @@ pub(crate) fn recorded_states(kind: Kind) -> usize {
     kind.info().states.max(1)
 }
 
+/// The columns of a recording in a fixed order, each with its name and number of entries a sample.
+macro_rules! columns {
+    ($of:ident, $($by:tt)+) => {{
+        let (effects, memories) = ($of.effects.len(), $of.memories());
+        [
+            ("time", 1, $($by)+ $of.time),
+            ("q", N, $($by)+ $of.q),
+            ("qd", N, $($by)+ $of.qd),
+            ("qdd", N, $($by)+ $of.qdd),
+            ("tip", 2, $($by)+ $of.tip),
+            ("handle", 2, $($by)+ $of.handle),
+            ("robot_q", 2, $($by)+ $of.robot_q),
+            ("robot_qd", 2, $($by)+ $of.robot_qd),
+            ("robot_qdd", 2, $($by)+ $of.robot_qdd),
+            ("force_on_arm", 2, $($by)+ $of.force_on_arm),
+            ("moment_on_arm", 1, $($by)+ $of.moment_on_arm),
+            ("torque.inertial", N, $($by)+ $of.torque.inertial),
+            ("torque.centrifugal", N, $($by)+ $of.torque.centrifugal),
+            ("torque.coriolis", N, $($by)+ $of.torque.coriolis),
+            ("torque.gravity", N, $($by)+ $of.torque.gravity),
+            ("torque.frame", N, $($by)+ $of.torque.frame),
+            ("torque.resisting", N, $($by)+ $of.torque.resisting),
+            ("torque.drive", N, $($by)+ $of.torque.drive),
+            ("torque.contact", N, $($by)+ $of.torque.contact),
+            ("resisting", effects, $($by)+ $of.resisting),
+            ("memory", memories, $($by)+ $of.memory),
+            ("energy.kinetic", 1, $($by)+ $of.energy.kinetic),
+            ("energy.potential", 1, $($by)+ $of.energy.potential),
+            ("energy.contact", 1, $($by)+ $of.energy.contact),
+            ("work.handle", 1, $($by)+ $of.work.handle),
+            ("work.drive", 1, $($by)+ $of.work.drive),
+            ("work.resisted", 1, $($by)+ $of.work.resisted),
+            ("work.damped", 1, $($by)+ $of.work.damped),
+        ]
+    }};
+}
+
 impl<const N: usize> Recording<N> {
     /// Number of samples.
     pub fn len(&self) -> usize {
@@ -137,37 +174,12 @@ impl<const N: usize> Recording<N> {
 
     /// Every column with its name and number of entries a sample, in a fixed order.
     pub fn columns(&self) -> [(&'static str, usize, &[f64]); 28] {
-        let (t, e, w, effects) = (&self.torque, &self.energy, &self.work, self.effects.len());
-        [
-            ("time", 1, &self.time),
-            ("q", N, &self.q),
-            ("qd", N, &self.qd),
-            ("qdd", N, &self.qdd),
-            ("tip", 2, &self.tip),
-            ("handle", 2, &self.handle),
-            ("robot_q", 2, &self.robot_q),
-            ("robot_qd", 2, &self.robot_qd),
-            ("robot_qdd", 2, &self.robot_qdd),
-            ("force_on_arm", 2, &self.force_on_arm),
-            ("moment_on_arm", 1, &self.moment_on_arm),
-            ("torque.inertial", N, &t.inertial),
-            ("torque.centrifugal", N, &t.centrifugal),
-            ("torque.coriolis", N, &t.coriolis),
-            ("torque.gravity", N, &t.gravity),
-            ("torque.frame", N, &t.frame),
-            ("torque.resisting", N, &t.resisting),
-            ("torque.drive", N, &t.drive),
-            ("torque.contact", N, &t.contact),
-            ("resisting", effects, &self.resisting),
-            ("memory", self.memories(), &self.memory),
-            ("energy.kinetic", 1, &e.kinetic),
-            ("energy.potential", 1, &e.potential),
-            ("energy.contact", 1, &e.contact),
-            ("work.handle", 1, &w.handle),
-            ("work.drive", 1, &w.drive),
-            ("work.resisted", 1, &w.resisted),
-            ("work.damped", 1, &w.damped),
-        ]
+        columns!(self, &)
+    }
+
+    /// The same to change, or to take.
+    pub fn columns_mut(&mut self) -> [(&'static str, usize, &mut Vec<f64>); 28] {
+        columns!(self, &mut)
     }
 }
 
