@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import re
 import unicodedata
@@ -51,10 +52,27 @@ Figures = Mapping[str, Callable[[], Drawn]]
 """The figures of a result by their names, each drawn when it is called."""
 
 
-def draw(figures: Figures) -> list[Drawn]:
-    """Draw all figures of a result."""
-    with plotting.style():
-        return [one() for one in figures.values()]
+@dataclass(frozen=True)
+class Image:
+    """A figure that was drawn, as PNG, with the words of `Drawn`."""
+
+    name: str
+    title: str
+    text: str
+    section: str
+    png: bytes
+
+
+def draw(figures: Figures) -> list[Image]:
+    """Draw all figures of a result, each to its end before the next."""
+    with plotting.style(), plotting.same_sheet():
+        return [_image(one()) for one in figures.values()]
+
+
+def _image(drawn: Drawn) -> Image:
+    png = io.BytesIO()
+    plotting.write_png(drawn.figure, png)
+    return Image(drawn.name, drawn.title, drawn.text, drawn.section, png.getvalue())
 
 
 def shown(one: Callable[[], Drawn]) -> np.ndarray:

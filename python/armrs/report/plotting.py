@@ -113,6 +113,23 @@ def figure(width: float, height: float) -> Figure:
     return made
 
 
+Sheets = dict[tuple[int, float, float, float], tuple["Figure", np.ndarray]]
+_SHEETS: ContextVar[Sheets | None] = ContextVar("_SHEETS", default=None)
+
+
+@contextmanager
+def same_sheet() -> Iterator[None]:
+    """Draw figures of panels in `pairs` of one shape on the same sheet, each after the one before was written.
+
+    Axes, ticks and measured labels remain: to make them anew takes longer than what changes.
+    """
+    before = _SHEETS.set({})
+    try:
+        yield
+    finally:
+        _SHEETS.reset(before)
+
+
 _LEFT, _RIGHT, _TOP, _BOTTOM, _BETWEEN = 0.95, 0.15, 0.35, 0.5, 0.35
 """Margins around a panel for its labels, and between two of a column [inches]."""
 _SHORT = 0.8
@@ -148,6 +165,9 @@ def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> t
     if any(_width(title) > _SHORT for title in titles):
         made = figure(width * count + 0.4, height)
         return made, made.subplots(2, count, **of_both)
+    sheets, shape = _SHEETS.get(), (count, width, height, ratio)
+    if sheets is not None and shape in sheets:
+        return _emptied(*sheets[shape])
     made = figure(width * count, height)
     made.set_layout_engine("none")
     across, high = width - _LEFT - _RIGHT, height - _TOP - _BOTTOM - _BETWEEN
@@ -164,7 +184,20 @@ def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> t
         ax.locator_params(nbins=6, steps=[1, 2, 5, 10])
         ax.yaxis.set_label_coords((0.18 - _LEFT) / across, 0.5)
         ax.xaxis.set_label_coords(0.5, (0.2 - _BOTTOM) * (1.0 + ratio) / high)
+    if sheets is not None:
+        sheets[shape] = made, axes
     return made, axes
+
+
+def _emptied(sheet: Figure, axes: np.ndarray) -> tuple[Figure, np.ndarray]:
+    """Remove what was plotted; titles and labels stay until others are set."""
+    for ax in axes.ravel():
+        for artist in (*ax.lines, *ax.collections, *filter(None, [ax.get_legend()])):
+            artist.remove()
+        ax.set_prop_cycle(None)
+        ax.relim()
+        ax.autoscale()
+    return sheet, axes
 
 
 def halo() -> list[Any]:
@@ -180,7 +213,7 @@ def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
 
     with style():
         figure.set_dpi(130)
-        canvas = FigureCanvasAgg(figure)
+        canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
         engine = figure.get_layout_engine()
         if figure.axes and engine is not None:
             engine.execute(figure)

@@ -17,7 +17,7 @@ from ..workflows.passive import PassiveMoments
 from ..workflows.plan import Plan, plan_data, write_movements
 from ..workflows.record import Recorded
 from ..workflows.simulate import Run, Simulated
-from . import dataset_pages, figures, interactive, pages, plotting, run_animation
+from . import dataset_pages, figures, interactive, pages, run_animation
 from .view import View
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def write_identified(result: Identified, data: dict[str, Any], folder: Path) -> 
 
 
 def write_result(
-    folder: Path, stem: str, data: dict[str, Any], drawn: list[figures.Drawn], shown: interactive.Live = interactive.NOTHING
+    folder: Path, stem: str, data: dict[str, Any], drawn: list[figures.Image], shown: interactive.Live = interactive.NOTHING
 ) -> list[Path]:
     """Write figures and what moves, then the JSON that names them, then the report of all; return the files, the report last."""
     pictures = []
@@ -66,7 +66,7 @@ def write_result(
         path = folder / "figures" / f"{item.name}.png"
         files.may_replace(path, ".png")
         with files.replacing(path) as temporary:
-            plotting.write_png(item.figure, temporary)
+            temporary.write_bytes(item.png)
         pictures.append(path)
     data["figures"] = [
         {"file": f"figures/{d.name}.png", "title": d.title, "text": d.text} | ({"section": d.section} if d.section else {}) for d in drawn

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping
@@ -14,8 +13,8 @@ import numpy as np
 
 from .. import checks
 from ..errors import BadInput, Text, unknown_name
-from . import html, interactive, pages, plotting
-from .figures import Drawn, Figures, draw, shown
+from . import html, interactive, pages
+from .figures import Figures, draw, shown
 
 
 @dataclass(frozen=True)
@@ -53,11 +52,6 @@ class View:
         data = self.data(result)
         pictures = defaultdict(list)
         for drawn in draw(self.figures(result, data)):
-            pictures[drawn.section].append(_picture(drawn))
+            picture = html.Picture(f"{drawn.name}.png", drawn.title, drawn.text, html.data_uri(drawn.png))
+            pictures[drawn.section].append(picture)
         return pages.write_page_of(data, pictures, target, self.moving(result))
-
-
-def _picture(drawn: Drawn) -> html.Picture:
-    image = io.BytesIO()
-    plotting.write_png(drawn.figure, image)
-    return html.Picture(f"{drawn.name}.png", drawn.title, drawn.text, html.data_uri(image.getvalue()))
