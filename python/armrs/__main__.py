@@ -1,6 +1,7 @@
 """`armrs` and `python -m armrs`: the command line; an interrupt while it loads ends with one line instead of a traceback."""
 
 import contextlib
+import gc
 import os
 import sys
 
@@ -9,6 +10,9 @@ def main() -> None:
     """Run the command line and end the process with its status."""
     # The matrices here are small: with one thread per core, NumPy's threads mostly wait for one another where other programs run too.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Imports and figures make many objects that live until the end: to look for garbage among them again and again takes a
+    # twentieth of a short verb.
+    gc.set_threshold(50_000)
     try:
         from .cli import run
 

@@ -207,19 +207,26 @@ def halo() -> list[Any]:
     return [withStroke(linewidth=3.0, foreground="white")]
 
 
+_DPI = 130
+
+
 def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
     """Write a figure as the PNG image that stands in reports."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
 
     with style():
-        figure.set_dpi(130)
+        figure.set_dpi(_DPI)
         canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
         engine = figure.get_layout_engine()
         if figure.axes and engine is not None:
             engine.execute(figure)
             figure.set_layout_engine("none")
         # `savefig` would lay the figure out twice, and draw it once more to no end.
-        canvas.print_png(target, pil_kwargs={"compress_level": 4})  # type: ignore[no-untyped-call]
+        canvas.draw()
+    # Nothing is transparent: a fourth channel would take longer, and make the file larger.
+    colours = np.asarray(canvas.buffer_rgba())[..., :3]
+    Image.fromarray(colours).save(target, "png", compress_level=3, dpi=(_DPI, _DPI))
 
 
 def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:
@@ -271,23 +278,14 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
         What stands at each line.
     """
     ax = _axes(ax)
-    for row, item in enumerate(items):
-        if item.get("reference") is not None:
-            ax.plot(item["reference"], row, marker="|", ms=24, mew=2.4, color=GREEN, ls="")
-        colour, fill = MARKERS[item["decided_by"]]
-        ax.hlines(row, *item["interval"], color=colour, lw=2.2, alpha=0.9)
-        ax.plot(
-            item["value"],
-            row,
-            marker=_SHAPES[item["decided_by"]],
-            ms=7,
-            mew=1.7,
-            color=colour,
-            mfc=colour if fill == "full" else "white",
-            ls="",
-        )
-        if item.get("given") is not None:
-            ax.plot(item["given"], row, marker="x", ms=7, mew=1.5, color=INK, ls="", alpha=0.75)
+    rows = list(enumerate(items))
+    _markers(ax, rows, "reference", marker="|", ms=24, mew=2.4, color=GREEN)
+    for key, (colour, fill) in MARKERS.items():
+        own = [(row, item) for row, item in rows if item["decided_by"] == key]
+        if own:
+            ax.hlines([row for row, _ in own], *zip(*(item["interval"] for _, item in own), strict=True), color=colour, lw=2.2, alpha=0.9)
+        _markers(ax, own, "value", marker=_SHAPES[key], ms=7, mew=1.7, color=colour, mfc=colour if fill == "full" else "white")
+    _markers(ax, rows, "given", marker="x", ms=7, mew=1.5, color=INK, alpha=0.75)
     ax.set_yticks(range(len(items)), labels)
     ax.set_ylim(len(items) - 0.4, -0.6)
     ax.grid(visible=False, axis="y")
@@ -295,6 +293,13 @@ def intervals(items: Sequence[Mapping[str, Any]], labels: Sequence[str], ax: Axe
     ax.locator_params(axis="x", nbins=6)
     ax.set_xlabel(f"[{formatting.unit(items[0]['unit']) or 'relative'}]" if items else "")
     return ax
+
+
+def _markers(ax: Axes, rows: Sequence[tuple[int, Mapping[str, Any]]], key: str, **look: Any) -> None:
+    """Mark a number of those items that have it, in their rows."""
+    there = [(item[key], row) for row, item in rows if item.get(key) is not None]
+    if there:
+        ax.plot(*zip(*there, strict=True), ls="", **look)
 
 
 def interval_legend(figure: Figure, items: Sequence[Mapping[str, Any]]) -> None:
