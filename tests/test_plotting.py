@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from itertools import pairwise
 
 import matplotlib
@@ -132,6 +133,38 @@ def test_labels_of_large_numbers_do_not_collide() -> None:
 def test_a_grid_leaves_few_places_empty(count: int, shape: tuple[int, int]) -> None:
     """Four panels were three, and one below."""
     assert plotting.grid(count) == shape
+
+
+def test_what_was_on_a_sheet_before_leaves_no_trace() -> None:
+    def image(scale: float, repeats: int) -> bytes:
+        figure, axes = plotting.pairs(["elbow"], 5.0, 4.6, 2.0)
+        plotting.torque(scale * T, scale * np.sin(T), np.cos(T), axes[0, 0], title=f"{repeats}")
+        plotting.residual([(T, scale * np.sin(T), "fit")] * repeats, axes[1, 0])
+        if scale > 1.0:
+            plotting.mean_and_spread(T, T, np.ones_like(T), axes[1, 0], label="band")
+        else:
+            axes[1, 0].set_ylim(bottom=0.0)
+        png = io.BytesIO()
+        plotting.write_png(figure, png)
+        return png.getvalue()
+
+    sheets = [(1.0, 3), (1e6, 1), (1e-3, 2)]
+    with plotting.style():
+        alone = [image(*sheet) for sheet in sheets]
+        with plotting.same_sheet():
+            assert [image(*sheet) for sheet in sheets] == alone
+            assert plotting.pairs(["elbow"], 5.0, 4.6, 2.0)[0] is plotting.pairs(["knee"], 5.0, 4.6, 2.0)[0]
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_panels_of_intervals_keep_apart(count: int) -> None:
+    labels = ["a long name of a parameter", "b", "c"]
+    with plotting.style():
+        figure = plotting.interval_panels([[(ITEMS, labels)] * count, [(ITEMS[:1], labels[:1])]])
+        figure.draw_without_rendering()
+        boxes = [box for box in [*(ax.get_tightbbox() for ax in figure.axes), figure.legends[0].get_window_extent()] if box is not None]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    assert all(figure.bbox.contains(*corner) for box in boxes for corner in (box.min, box.max))
 
 
 def test_without_axes_a_figure_is_made(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,19 +123,9 @@ def parameters(items: Sequence[Mapping[str, Any]], joints: Sequence[str], level:
     unique = list({(tables.label(item), item.get("joint")): item for item in reversed(items)}.values())[::-1]
     units = list(dict.fromkeys(item["unit"] for item in unique))
     panels = [[item for item in unique if item["unit"] == unit] for unit in units]
-    sizes = [len(panel) + 1.1 for panel in panels]
-    columns = 2 if len(panels) > 1 else 1
-    split = _balanced(sizes, columns)
-    height = max(sum(sizes[k] for k in column) for column in split)
-    figure = plotting.figure(5.4 * columns, 0.36 * height + 0.9)
-    grid = figure.add_gridspec(1, columns)
-    for place, column in enumerate(split):
-        spare = height - sum(sizes[k] for k in column)
-        ratios = [sizes[k] for k in column] + ([spare] if spare > 0.5 else [])
-        rows = grid[0, place].subgridspec(len(ratios), 1, height_ratios=ratios)
-        for row, k in enumerate(column):
-            plotting.intervals(panels[k], [quantity_name(item, joints) for item in panels[k]], figure.add_subplot(rows[row, 0]))
-    plotting.interval_legend(figure, unique)
+    split = _balanced([len(panel) + 1.1 for panel in panels], 2 if len(panels) > 1 else 1)
+    columns = [[(panels[k], [quantity_name(item, joints) for item in panels[k]]) for k in column] for column in split]
+    figure = plotting.interval_panels(columns)
     text = (
         f"Bars are {100 * level:g} % intervals. A value with a full marker is determined by the measurement. One with a hollow marker is "
         "not: where the movements leave a value open it is that of the model as given, moved only as far as the combinations that are "

@@ -136,13 +136,13 @@ _SHORT = 0.8
 """Width of a title beside which a legend of three stands in these margins [inches]."""
 
 
-def _width(title: str) -> float:
-    """Return the width of a title above a panel [inches]."""
+def text_width(text: str, size: float = _STYLE["ytick.labelsize"], weight: str = "normal") -> float:
+    """Return the width of a text [inches], if nothing else is said that of the label of a tick."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextToPath
 
-    font = FontProperties(weight=_STYLE["axes.titleweight"], size=_STYLE["axes.titlesize"])
-    return float(TextToPath().get_text_width_height_descent(title, font, ismath=False)[0] / 72.0)
+    font = FontProperties(weight=weight, size=size)
+    return float(TextToPath().get_text_width_height_descent(text, font, ismath=False)[0] / 72.0)
 
 
 def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> tuple[Figure, np.ndarray]:
@@ -162,7 +162,7 @@ def pairs(titles: Sequence[str], width: float, height: float, ratio: float) -> t
     """
     count = max(len(titles), 1)
     of_both: dict[str, Any] = {"squeeze": False, "sharex": "col", "height_ratios": (ratio, 1.0)}
-    if any(_width(title) > _SHORT for title in titles):
+    if any(text_width(title, _STYLE["axes.titlesize"], _STYLE["axes.titleweight"]) > _SHORT for title in titles):
         made = figure(width * count + 0.4, height)
         return made, made.subplots(2, count, **of_both)
     sheets, shape = _SHEETS.get(), (count, width, height, ratio)
@@ -217,7 +217,7 @@ def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
 
     with style():
         figure.set_dpi(_DPI)
-        canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
+        canvas: Any = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
         engine = figure.get_layout_engine()
         if figure.axes and engine is not None:
             engine.execute(figure)
@@ -302,6 +302,44 @@ def _markers(ax: Axes, rows: Sequence[tuple[int, Mapping[str, Any]]], key: str, 
         ax.plot(*zip(*there, strict=True), ls="", **look)
 
 
+_COLUMN, _ROW, _BELOW, _BESIDE, _ABOVE, _LINE = 5.4, 0.36, 0.52, 0.22, 0.15, 0.2
+"""A column of panels of intervals: its width, one of its rows, what stands below a panel, right of it, above all, and a line of a legend
+[inches]."""
+
+
+def interval_panels(columns: Sequence[Sequence[tuple[Sequence[Mapping[str, Any]], Sequence[str]]]]) -> Figure:
+    """Return a figure of `intervals`, panels above one another in columns, and what their markers mean.
+
+    Margins follow from the widest label of each column: to lay the figure out by its parts would take longer than to draw it.
+
+    Parameters
+    ----------
+    columns : sequence of sequences of (items, labels)
+        The panels of each column, as `intervals` takes them.
+    """
+    rows = [[len(items) + 1.1 for items, _ in column] for column in columns]
+    width, height = _COLUMN * len(columns), _ROW * max(map(sum, rows)) + 0.9
+    made = figure(width, height)
+    made.set_layout_engine("none")
+    interval_legend(made, [item for column in columns for items, _ in column for item in items])
+    lines = -(-len(made.legends[0].legend_handles) // _legend_columns(made))
+    top = height - _ABOVE - _LINE * lines
+    row = min((top - _BELOW * len(column)) / sum(column) for column in rows)
+    for k, column in enumerate(columns):
+        beside = min(0.12 + max(text_width(label) for _, labels in column for label in labels), 0.8 * _COLUMN)
+        at = top
+        for (items, labels), high in zip(column, rows[k], strict=True):
+            at -= row * high
+            place = (_COLUMN * k + beside) / width, at / height, (_COLUMN - beside - _BESIDE) / width, row * high / height
+            intervals(items, labels, made.add_axes(place))
+            at -= _BELOW
+    return made
+
+
+def _legend_columns(figure: Figure) -> int:
+    return 4 if figure.get_figwidth() > 8.0 else 2
+
+
 def interval_legend(figure: Figure, items: Sequence[Mapping[str, Any]]) -> None:
     """Explain the markers of `intervals` above a figure, those that occur."""
     from matplotlib.lines import Line2D
@@ -316,7 +354,7 @@ def interval_legend(figure: Figure, items: Sequence[Mapping[str, Any]]) -> None:
         handles.append(Line2D([], [], color=INK, marker="x", ls="", mew=1.5, ms=7, label="model as given"))
     if any(item.get("reference") is not None for item in items):
         handles.append(Line2D([], [], color=GREEN, marker="|", ls="", mew=2.4, ms=14, label="known value"))
-    figure.legend(handles=handles, loc="outside upper left", ncols=4 if figure.get_figwidth() > 8.0 else 2, fontsize=9)
+    figure.legend(handles=handles, loc="outside upper left", ncols=_legend_columns(figure), fontsize=9)
 
 
 def angles(t: np.ndarray, q: np.ndarray, names: Sequence[str], ax: Axes | None = None, *, measured: np.ndarray | None = None) -> Axes:
