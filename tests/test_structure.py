@@ -93,9 +93,11 @@ LATE = {
     "armrs.catalogue": {"armrs"},
     "armrs.fmu.worker": {"armrs.fmu.library_probe", "armrs.fmu.imported_slave"},
     "armrs.report.sentences": {"armrs.workflows.plan"},
+    "armrs.workflows.result_data": {"armrs.workflows.importing.recipe"},
 }
 """Modules beside the commands that import in functions: a command that is interrupted while it loads ends with one line, effects are listed
-where nothing is compiled, a worker loads what its task needs before limits hold, and an old result is shown without what computed it."""
+where nothing is compiled, a worker loads what its task needs before limits hold, an old result is shown without what computed it, and results of data sets that were
+not imported need nothing of the import."""
 
 
 def test_imports_stand_in_functions_where_starting_asks_for_it_alone() -> None:

@@ -26,6 +26,8 @@ from .samples import SUFFIXES, write_samples
 from .trial import FEWEST_SAMPLES, Reading, Trial, moving_bases, read_trial, still_angles
 
 FILE = "dataset.toml"
+IMPORT_FILE = "import.toml"
+"""Beside it, the decisions of `armrs import` where that wrote the data set."""
 NO_MODEL = "no model is named: the arm is that of the subject by the literature (de Leva 1996)"
 
 _MOST_SEGMENTS = 3

@@ -11,10 +11,9 @@ from .. import _armrs
 from ..analysis.passive_curve import LEVEL
 from ..analysis.quantity_expressions import value_in
 from ..errors import BadInput
-from ..io.dataset import Dataset
+from ..io.dataset import IMPORT_FILE, Dataset
 from ..model import Contact
 from .identify import Estimate, Identified
-from .importing.recipe import FILE, load_recipe
 from .passive import PassiveMoments
 from .simulate import Run, Simulated
 
@@ -62,9 +61,12 @@ def laboratory_angles(dataset: Dataset) -> dict[str, Any] | None:
 
     None elsewhere, and where the laboratory's angles are no angles of joints.
     """
-    path = None if dataset.folder is None else dataset.folder / FILE
+    path = None if dataset.folder is None else dataset.folder / IMPORT_FILE
     if path is None or not path.is_file():
         return None
+    # Few data sets need the modules of an import.
+    from .importing.recipe import load_recipe
+
     try:
         convention = load_recipe(path).convention
     except BadInput:  # no longer whole: the angles are then counted as armrs does

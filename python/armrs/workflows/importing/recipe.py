@@ -11,7 +11,6 @@ from ... import checks
 from ...errors import BadInput
 from ...io import tomlfile
 
-FILE = "import.toml"
 REFERENCES = ("relative", "absolute")
 ZEROS = ("horizontal", "hanging")
 

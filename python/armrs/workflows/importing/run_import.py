@@ -14,7 +14,7 @@ import numpy as np
 from ... import checks
 from ...errors import BadInput, BadInputs, Sentence, Text, unknown_name
 from ...io import files
-from ...io.dataset import Dataset, load_dataset
+from ...io.dataset import IMPORT_FILE, Dataset, load_dataset
 from ...io.raw import RawTable
 from ...io.raw.units import unit
 from ...io.samples import write_samples
@@ -26,7 +26,7 @@ from . import column_guess, conventions, file_remarks, file_roles, force_alignme
 from . import raw_tables as raw
 from .column_guess import symbol_of
 from .raw_trial import LoadedTrial, arrays, by, on_clock, values
-from .recipe import FILE, Channel, Convention, RawTrial, Recipe, load_recipe
+from .recipe import Channel, Convention, RawTrial, Recipe, load_recipe
 from .sample_cleaning import cleaned
 
 _SI = {"time": "s", "angle": "rad", "speed": "rad_s", "force": "N", "moment": "Nm"}
@@ -497,13 +497,13 @@ def _write(folder: Path, former: set[str], model: Model, recipe: Recipe, reads: 
         force_on, (subject, tolerance) = recipe.convention.force_on, about
         content = Description(folder.resolve().name, "model.toml", entries, force_on=force_on, subject=subject, tolerance=tolerance)
         files.write_text(part / "dataset.toml", content.to_toml(), kind=".toml")
-        files.write_text(part / FILE, kept.to_toml(), kind=".toml")
+        files.write_text(part / IMPORT_FILE, kept.to_toml(), kind=".toml")
         try:
             datasets.append(load_dataset(part))
         except BadInput as error:  # what could not be read again is not written
             problems = error.problems if isinstance(error, BadInputs) else (error,)
             raise BadInputs.of([p.within(file=folder / Path(p.file or part).relative_to(part)) for p in problems]) from None
-        return [*written, part / "model.toml", part / "dataset.toml", part / FILE]
+        return [*written, part / "model.toml", part / "dataset.toml", part / IMPORT_FILE]
 
     written = files.write_whole(folder, write)
     for name in former - {path.relative_to(folder).as_posix() for path in written}:
@@ -515,12 +515,12 @@ def _former(folder: Path, replaced: bool) -> set[str]:
     """Return the trials that a former import left in a folder, where it may be replaced; a data set of another origin never may."""
     if not (folder / "dataset.toml").exists():
         return set()
-    if not (folder / FILE).is_file():
+    if not (folder / IMPORT_FILE).is_file():
         raise BadInput("-o", Sentence("this folder holds a data set that armrs import did not write"), files.ANOTHER, file=folder)
     if not replaced:
         instead = f"{files.ANOTHER}, or --force, which replaces it whole, with all that was edited in it"
         raise BadInput("-o", Sentence("this folder holds the data set of a former import"), instead, file=folder)
-    return {_name_of(trial) for trial in load_recipe(folder / FILE).trials}
+    return {_name_of(trial) for trial in load_recipe(folder / IMPORT_FILE).trials}
 
 
 def _name_of(trial: RawTrial) -> str:
