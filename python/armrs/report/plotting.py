@@ -225,8 +225,7 @@ def write_png(figure: Figure, target: Path | IO[bytes]) -> None:
         # `savefig` would lay the figure out twice, and draw it once more to no end.
         canvas.draw()
     # Nothing is transparent: a fourth channel would take longer, and make the file larger.
-    colours = np.asarray(canvas.buffer_rgba())[..., :3]
-    Image.fromarray(colours).save(target, "png", compress_level=3, dpi=(_DPI, _DPI))
+    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").save(target, "png", compress_level=3, dpi=(_DPI, _DPI))
 
 
 def torque(t: np.ndarray, measured: np.ndarray, fitted: np.ndarray, ax: Axes | None = None, *, title: str = "") -> Axes:
