@@ -246,7 +246,7 @@ pub trait Law {
 /// As in Andersson, Söderberg, Björklund 2007: friction without a sticking state. For a smoothing of zero it is the sign itself,
 /// zero at rest.
 #[inline]
-pub fn smooth_sign<T: Scalar>(speed: T, smoothing: T) -> T {
+pub(super) fn smooth_sign<T: Scalar>(speed: T, smoothing: T) -> T {
     let sign = || {
         let negative = T::if_less(speed, T::ZERO, -T::ONE, T::ZERO);
         T::if_less(T::ZERO, speed, T::ONE, negative)

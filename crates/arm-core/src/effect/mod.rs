@@ -20,7 +20,6 @@ pub use custom_effect::CustomEffect;
 pub use custom_effect::CustomLaw;
 pub use law::{
     ActsOn, Info, Law, Local, MAX_PARAMETERS, MAX_STATES, Parameter, Parameters, States,
-    smooth_sign,
 };
 pub use place::Place;
 pub use prior::{Family, Nature, Part, Prior, Promise, Values};
@@ -517,24 +516,6 @@ pub fn resisting_besides_dry<T: Scalar, const N: usize>(
     let mut total = joints([T::ZERO; N]);
     for (effect, state) in in_joints::<T, N>(effects, memory) {
         if effect.is_dry() {
-            total[effect.index] += effect.besides_dry(&motion.local(effect.index, state));
-        } else {
-            effect.resist(motion, state, &mut total);
-        }
-    }
-    total
-}
-
-/// Sum of what all effects resist with besides dry friction, smooth or set-valued \[N m\], see [`resisting_torque`].
-#[inline]
-pub fn resisting_besides_friction<T: Scalar, const N: usize>(
-    effects: &[Effect<T>],
-    motion: &Motion<T, N>,
-    memory: &[States<T>],
-) -> Joints<T, N> {
-    let mut total = joints([T::ZERO; N]);
-    for (effect, state) in in_joints::<T, N>(effects, memory) {
-        if effect.kind.smoothed_by().is_some() {
             total[effect.index] += effect.besides_dry(&motion.local(effect.index, state));
         } else {
             effect.resist(motion, state, &mut total);

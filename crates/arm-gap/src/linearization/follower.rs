@@ -3,9 +3,7 @@
 //! The scheme of the linearised run with a nonlinear equation in every step. What it gives is the run itself and, on top, what two
 //! coarse solutions differ by, so that their common error drops out.
 
-use arm_core::effect::{
-    MAX_STATES, Motion, States, advance_states, any_state, resisting_besides_friction,
-};
+use arm_core::effect::{MAX_STATES, Motion, States, advance_states, any_state};
 use arm_core::{Joints, Plane};
 use arm_sim::{Change, SimulationError, SmoothFriction};
 use nalgebra::SMatrix;
@@ -14,7 +12,7 @@ use crate::data::course::{Channels, Course};
 use crate::hypothesis::Hypothesis;
 use crate::linearization::linearized_run::{ASTRAY, Linear};
 use crate::linearization::newton::{MissingTorque, newton, slide};
-use crate::linearization::plant::{Balance, Hand, Plant, State, balance, balance_with, hands};
+use crate::linearization::plant::{Balance, Hand, Plant, State, balance, hands};
 use crate::measurement_model::start::held_at_start;
 
 impl<const N: usize> Linear<'_, N> {
@@ -235,6 +233,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
         let (line, plant) = (self.line, self.plant);
         let Instant { i, reach, .. } = *instant;
         let error = line.error(i);
+        let there = |next: &Joints<f64, N>| balance(plant, &instant.place(next), hand, memory);
         let (next, found, exact) = if self.rubs {
             let [smooth, own] = &mut self.smooth;
             renew(
@@ -244,14 +243,13 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
                 memory,
             );
             renew(own, &line.own.plant, &line.balances[i].motion, &[]);
+            let speed = |next: &Joints<f64, N>| instant.state.qd + instant.speed_with(next);
             let missing = |next: &Joints<f64, N>| {
-                let place = instant.place(next);
-                let besides = resisting_besides_friction;
-                let there = balance_with(plant, &place, (hand, memory), besides);
-                let more = outgrown(smooth, plant, &there.motion, memory);
+                let (there, speed) = (there(next), speed(next));
+                let rubbing = SmoothFriction::sum(smooth, &speed).0;
                 MissingTorque {
-                    torque: error - there.torque - more,
-                    speed: place.qd,
+                    torque: error - there.torque + rubbing,
+                    speed,
                     there,
                 }
             };
@@ -264,7 +262,7 @@ impl<'l, 's, const N: usize> Follower<'l, 's, N> {
             (slid.at, slid.there, slid.exact)
         } else {
             let missing = |next: &Joints<f64, N>| {
-                let there = balance(plant, &instant.place(next), hand, memory);
+                let there = there(next);
                 (error - there.torque, there)
             };
             let own = &line.inverse[i];
@@ -294,24 +292,4 @@ fn renew<const N: usize>(
     if plant.creeps {
         smooth.extend(SmoothFriction::among(&plant.resisting, motion, memory));
     }
-}
-
-/// What the smooth friction of a plant resists with in a motion beyond what it would with the sizes that were taken \[N m\].
-fn outgrown<const N: usize>(
-    taken: &[SmoothFriction],
-    plant: &Plant<N>,
-    motion: &Motion<f64, N>,
-    memory: &[States<f64>],
-) -> Joints<f64, N> {
-    let mut more = Joints::zeros();
-    if taken.is_empty() {
-        return more;
-    }
-    for (now, then) in SmoothFriction::among(&plant.resisting, motion, memory).zip(taken) {
-        if now != *then {
-            let speed = motion.qd[now.joint];
-            more[now.joint] += now.at(speed).0 - then.at(speed).0;
-        }
-    }
-    more
 }

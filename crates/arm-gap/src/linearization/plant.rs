@@ -192,24 +192,11 @@ pub(super) struct Balance<const N: usize> {
     pub motion: Motion<f64, N>,
 }
 
-/// The balance of the equation of motion for a state of a plant.
 pub(super) fn balance<const N: usize>(
     plant: &Plant<N>,
     state: &State<N>,
     hand: Hand,
     memory: &[States<f64>],
-) -> Balance<N> {
-    balance_with(plant, state, (hand, memory), resisting_besides_dry)
-}
-
-/// The same with other torques in the joints.
-///
-/// * `resisting` - what counts of the torques of joint effects \[N m\]
-pub(super) fn balance_with<const N: usize>(
-    plant: &Plant<N>,
-    state: &State<N>,
-    (hand, memory): (Hand, &[States<f64>]),
-    resisting: impl Fn(&[Effect<f64>], &Motion<f64, N>, &[States<f64>]) -> Joints<f64, N>,
 ) -> Balance<N> {
     let pose = &state.pose;
     let [at, rate] = plant.handle(state.time, hand);
@@ -235,7 +222,7 @@ pub(super) fn balance_with<const N: usize>(
         let u = plant.setup.base_motion;
         torque[0] += u[0] * through[0][0] + u[1] * through[0][1];
     }
-    let resisted = resisting(&plant.resisting, &motion, memory);
+    let resisted = resisting_besides_dry(&plant.resisting, &motion, memory);
     Balance {
         torque: torque + resisted,
         resisted,

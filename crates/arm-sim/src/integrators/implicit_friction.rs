@@ -4,7 +4,7 @@
 //! that is smooth, and an exchange of modes for friction that is set-valued, as in principal pivoting (Murty 1974).
 
 use arm_core::Joints;
-use arm_core::effect::{Effect, Motion, States, smooth_sign};
+use arm_core::effect::{Effect, Motion, States};
 use nalgebra::SMatrix;
 
 /// Smooth dry friction of a joint: `most · tanh(speed/smoothing)`.
@@ -37,8 +37,8 @@ impl SmoothFriction {
     }
 
     /// Its torque at a speed, and the slope of that \[N m, N m s/rad\].
-    pub fn at(&self, speed: f64) -> (f64, f64) {
-        let share = smooth_sign(speed, self.smoothing);
+    fn at(&self, speed: f64) -> (f64, f64) {
+        let share = libm::tanh(speed / self.smoothing);
         let slope = self.most / self.smoothing * (1.0 - share * share);
         (self.most * share, slope)
     }
@@ -141,35 +141,6 @@ impl<const N: usize> ImplicitFriction<'_, N> {
     }
 }
 
-/// The solution of linear equations by elimination without pivoting, which a matrix with positive definite symmetric part does not need
-/// (Golub, Van Loan 2013, section 4.3.2); `None` for a pivot of zero.
-fn eliminated<const N: usize>(
-    mut matrix: SMatrix<f64, N, N>,
-    mut right: Joints<f64, N>,
-) -> Option<Joints<f64, N>> {
-    let mut reciprocal = [0.0; N];
-    for k in 0..N {
-        if matrix[(k, k)] == 0.0 {
-            return None;
-        }
-        reciprocal[k] = 1.0 / matrix[(k, k)];
-        for i in k + 1..N {
-            let factor = matrix[(i, k)] * reciprocal[k];
-            for c in k + 1..N {
-                matrix[(i, c)] -= factor * matrix[(k, c)];
-            }
-            right[i] -= factor * right[k];
-        }
-    }
-    for k in (0..N).rev() {
-        for c in k + 1..N {
-            right[k] -= matrix[(k, c)] * right[c];
-        }
-        right[k] *= reciprocal[k];
-    }
-    Some(right)
-}
-
 /// Newton's method, and what set-valued friction does meanwhile.
 struct Search<'a, const N: usize> {
     friction: &'a ImplicitFriction<'a, N>,
@@ -225,7 +196,7 @@ impl<'a, const N: usize> Search<'a, N> {
                 matrix[(j, j)] += slope[j];
             }
         }
-        eliminated(matrix, left)
+        matrix.try_inverse().map(|inverse| inverse * left)
     }
 
     /// Makes a step; whether a joint with smooth friction would turn round in it, and stops at zero.
