@@ -271,7 +271,8 @@ pub fn energy_balance(
             .extract::<PyReadonlyArray1<'_, f64>>()
     };
     let largest = |most: f64, v: &f64| {
-        if v.is_nan() {
+        // What is not a number stays, however large the others are.
+        if v.is_nan() || most.is_nan() {
             f64::NAN
         } else {
             most.max(v.abs())
