@@ -175,8 +175,8 @@ impl Butterworth {
     }
 }
 
-/// Columns side by side.
-const WIDTH: usize = 4;
+/// Columns side by side: each step waits for the one before, so that two registers of four take no longer than one.
+const WIDTH: usize = 8;
 
 /// One sample of columns side by side.
 type Abreast = [f64; WIDTH];
@@ -193,18 +193,45 @@ impl Computation for SideBySide<'_> {
 
     #[inline(always)]
     fn call(self) {
-        for (Section { b, a }, state) in self.sections.iter().zip(self.state) {
-            let [mut z0, mut z1] = *state;
-            for row in self.rows.iter_mut() {
-                for c in 0..WIDTH {
-                    let x = row[c];
-                    let y = b[0] * x + z0[c];
-                    z0[c] = b[1] * x - a[0] * y + z1[c];
-                    z1[c] = b[2] * x - a[1] * y;
-                    row[c] = y;
-                }
+        let pairs = self.sections.chunks(2).zip(self.state.chunks_mut(2));
+        for (sections, state) in pairs {
+            match sections.len() {
+                2 => together::<2>(sections, state, self.rows),
+                _ => together::<1>(sections, state, self.rows),
             }
-            *state = [z0, z1];
+        }
+    }
+}
+
+/// A pass through sections at a time: one works on a sample while the next still works on the sample before.
+#[inline(always)]
+fn together<const N: usize>(
+    sections: &[Section],
+    state: &mut [[Abreast; 2]],
+    rows: &mut [Abreast],
+) {
+    let mut now: [[Abreast; 2]; N] = core::array::from_fn(|s| state[s]);
+    for row in rows {
+        let mut sample = *row;
+        for s in 0..N {
+            sections[s].step(&mut now[s], &mut sample);
+        }
+        *row = sample;
+    }
+    state.copy_from_slice(&now);
+}
+
+impl Section {
+    /// Filters one sample of columns side by side.
+    #[inline(always)]
+    fn step(&self, [z0, z1]: &mut [Abreast; 2], row: &mut Abreast) {
+        let Self { b, a } = self;
+        for c in 0..WIDTH {
+            let x = row[c];
+            let y = b[0] * x + z0[c];
+            z0[c] = b[1] * x - a[0] * y + z1[c];
+            z1[c] = b[2] * x - a[1] * y;
+            row[c] = y;
         }
     }
 }
