@@ -48,6 +48,11 @@ impl Candidate {
         self.effect.kind
     }
 
+    /// Whether it is about dry friction.
+    pub fn is_dry(&self) -> bool {
+        self.kind().smoothed_by().is_some()
+    }
+
     /// Number of columns.
     pub fn width(&self) -> usize {
         self.free.len() + usize::from(self.rest.is_some())

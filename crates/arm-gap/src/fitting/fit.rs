@@ -1,9 +1,11 @@
 //! Fit of a hypothesis to the fit trials by Gauss and Newton's method, within a region in which its linear model is trusted.
 
+use std::sync::{Arc, OnceLock};
+
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::data::course::Channels;
-use crate::fitting::step::{Equations, Step, TrustRegion};
+use crate::fitting::step::{Aim, Equations, Step, TrustRegion};
 use crate::hypothesis::{Coordinate, Hypothesis, departure};
 use crate::linearization::linear_response::Response;
 use crate::prepared_session::PreparedSession;
@@ -41,6 +43,17 @@ pub struct FittedHypothesis<const N: usize> {
     pub rows: usize,
     /// Residuals of the fitted trials.
     pub residuals: Vec<Channels>,
+    /// Fits without each of its named effects, where they were needed.
+    pub(crate) without: Arc<OnceLock<WithoutEach<N>>>,
+}
+
+/// Fits of a hypothesis without each of its named effects.
+#[derive(Clone, Debug)]
+pub(crate) struct WithoutEach<const N: usize> {
+    /// The hypothesis.
+    pub whole: Hypothesis<N>,
+    /// Those fits, in the order of its named effects.
+    pub each: Vec<FittedHypothesis<N>>,
 }
 
 impl<const N: usize> FittedHypothesis<N> {
@@ -110,6 +123,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             cost,
             rows: self.compared_rows(),
             residuals,
+            without: Arc::default(),
         })
     }
 
@@ -156,10 +170,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         start: Hypothesis<N>,
         asked: Vec<Candidate>,
     ) -> Result<FittedHypothesis<N>, GapError> {
-        self.fit_towards(point, (start, asked), f64::INFINITY)
+        self.fit_towards(point, (start, asked), Aim::BEST)
     }
 
-    /// The same, given up where the cost will not come down to `aim`: the result is unfinished then, and its cost is above `aim`.
+    /// The same, given up where the cost will not come down to that of `aim`: the result is unfinished then, and its cost is above it.
     ///
     /// # Errors
     /// As [`PreparedSession::fit`].
@@ -167,14 +181,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         point: &LinearizationPoint<N>,
         (start, asked): (Hypothesis<N>, Vec<Candidate>),
-        aim: f64,
+        aim: Aim,
     ) -> Result<FittedHypothesis<N>, GapError> {
         let mut fitted = self.state(point, start, asked)?;
         let mut slopes: Option<Vec<Response>> = None;
         let mut region = TrustRegion {
             radius: f64::INFINITY,
         };
-        for _ in 0..STEPS {
+        for steps_left in (0..STEPS).rev() {
             let hypothesis = &fitted.hypothesis;
             let old = slopes.is_some();
             let fresh = || self.responses_at(point, hypothesis, &fitted.named());
@@ -188,7 +202,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let equations = Equations::new(&clusters, hypothesis, &coordinates);
             let hopeless = equations.is_hopeless(fitted.cost, aim);
             // A step that gains too little to first order need not be tried.
-            let least = FIRST_ORDER_SHARE * fitted.enough();
+            let enough =
+                |fitted: &FittedHypothesis<N>| fitted.enough().max(aim.negligible(fitted.cost));
+            let least = FIRST_ORDER_SHARE * enough(&fitted);
             let mut trusted = region;
             let mut found = None;
             for _ in 0..TRIES {
@@ -215,23 +231,24 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             region = trusted;
             let gained = fitted.cost - next.cost;
             fitted = next;
-            if gained < fitted.enough() {
+            let enough = enough(&fitted);
+            if gained < enough || aim.is_out_of_reach(fitted.cost, gained, steps_left) {
                 break;
             }
-            slopes = (gained < NEAR * fitted.enough()).then_some(responses);
+            slopes = (gained < NEAR * enough).then_some(responses);
         }
         Ok(fitted)
     }
 
     /// Continues a fit from where an undamped step leads, even if the cost is higher there; keeps the result if its cost is lower. What would
-    /// not come down to the cost `aim` is given up.
+    /// not come down to the cost of `aim` is given up.
     ///
     /// The cost as a function of a size and the rest angle of its law is a curved valley, in which steps that lower the cost are short.
     pub(crate) fn fit_on(
         &self,
         point: &LinearizationPoint<N>,
         mut fitted: FittedHypothesis<N>,
-        aim: f64,
+        aim: Aim,
     ) -> FittedHypothesis<N> {
         for _ in 0..CONTINUATIONS {
             let on = self.fit_after_whole_step(point, &fitted, aim);
@@ -248,7 +265,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         point: &LinearizationPoint<N>,
         fitted: &FittedHypothesis<N>,
-        aim: f64,
+        aim: Aim,
     ) -> Option<FittedHypothesis<N>> {
         let (coordinates, clusters) = self.equations(point, fitted, &Columns::default()).ok()?;
         let equations = Equations::new(&clusters, &fitted.hypothesis, &coordinates);
@@ -338,6 +355,7 @@ mod tests {
             cost,
             rows: 1000,
             residuals: Vec::new(),
+            without: Arc::default(),
         };
         assert_eq!(
             [1490.0, 1510.0].map(|cost| fitted(cost).leaves_much()),

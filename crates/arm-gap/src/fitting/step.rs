@@ -10,9 +10,64 @@ use crate::sensitivity::normal_equations::{Cluster, Normal, solve};
 const DAMPING: [f64; 16] = [
     0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0,
 ];
-/// A fit is given up where so many times the first-order gain of a whole step would not lower the cost to what it is fitted for: the
-/// response to strong effects is not linear.
-const HOPE: f64 = 4.0;
+/// What a fit is for.
+#[derive(Clone, Copy)]
+pub(crate) struct Aim {
+    /// The cost to which it must come down.
+    cost: f64,
+    /// The fit is given up where so many times the first-order gain of a whole step would not lower the cost to that: responses to strong
+    /// effects are not linear.
+    hope: f64,
+    /// Of what the cost exceeds this by, a hundredth does not count.
+    beside: f64,
+}
+
+impl Aim {
+    /// The best fit, whatever it costs.
+    pub const BEST: Self = Self {
+        cost: f64::INFINITY,
+        hope: f64::INFINITY,
+        beside: f64::INFINITY,
+    };
+
+    /// To come down to a cost.
+    ///
+    /// * `dry` - whether dry friction is fitted: to first order, a joint that sticks responds to nothing
+    pub fn at(cost: f64, dry: bool) -> Self {
+        /// Hopes without and with dry friction.
+        const HOPES: [f64; 2] = [1.5, 4.0];
+        Self {
+            cost,
+            hope: HOPES[usize::from(dry)],
+            ..Self::BEST
+        }
+    }
+
+    /// To see by how much more it costs than another fit.
+    pub fn beside(cost: f64) -> Self {
+        Self {
+            beside: cost,
+            ..Self::BEST
+        }
+    }
+
+    /// A gain that does not count at a cost.
+    pub fn negligible(&self, cost: f64) -> f64 {
+        0.01 * (cost - self.beside).max(0.0)
+    }
+
+    /// Whether steps after one that gained so much will not lead from a cost to the aim, if each gains at most four times as much as the one
+    /// before: the trusted region is at most doubled with each.
+    pub fn is_out_of_reach(&self, cost: f64, gained: f64, steps: usize) -> bool {
+        const GROWTH: f64 = 4.0;
+        let mut last = gained;
+        let reach = (0..steps).map(|_| {
+            last *= GROWTH;
+            last
+        });
+        cost > self.cost && cost - reach.sum::<f64>() > self.cost
+    }
+}
 
 /// The region in which a linear model is trusted (Moré 1978).
 #[derive(Clone, Copy)]
@@ -100,10 +155,10 @@ impl Equations {
         }
     }
 
-    /// Whether the cost will not come down to `aim`, by what a whole step would gain.
-    pub fn is_hopeless(&self, cost: f64, aim: f64) -> bool {
+    /// Whether the cost will not come down to an aim, by what a whole step would gain.
+    pub fn is_hopeless(&self, cost: f64, aim: Aim) -> bool {
         let gain = || self.step(0.0).map_or(f64::INFINITY, |step| step.gain);
-        cost > aim && cost - HOPE * gain() > aim
+        cost > aim.cost && cost - aim.hope * gain() > aim.cost
     }
 
     /// The step that lowers the cost most within bounds; `None` where the equations are singular.
@@ -237,8 +292,20 @@ mod tests {
     #[test]
     fn a_fit_is_given_up_where_steps_like_the_next_will_not_lead_to_its_aim() {
         let equations = equations(4.0, 12.0, (-10.0, 10.0));
-        assert!(equations.is_hopeless(200.0, 55.0) && !equations.is_hopeless(200.0, 57.0));
-        assert!(!equations.is_hopeless(50.0, 55.0) && !equations.is_hopeless(1e9, f64::INFINITY));
+        let hopeless = |cost, aim| equations.is_hopeless(cost, Aim::at(aim, true));
+        assert!(hopeless(200.0, 55.0) && !hopeless(200.0, 57.0));
+        assert!(!hopeless(50.0, 55.0) && !equations.is_hopeless(1e9, Aim::BEST));
+    }
+
+    /// After a gain of 2, three steps gain at most 8 + 32 + 128.
+    #[test]
+    fn an_aim_is_out_of_reach_where_steps_that_grow_do_not_lead_to_it() {
+        let aim = Aim::at(100.0, false);
+        assert!(aim.is_out_of_reach(269.0, 2.0, 3) && !aim.is_out_of_reach(267.0, 2.0, 3));
+        assert!(!aim.is_out_of_reach(99.0, 0.0, 0) && aim.is_out_of_reach(101.0, 0.0, 5));
+        assert!(!Aim::BEST.is_out_of_reach(1e9, 0.0, 0));
+        assert_eq!(Aim::beside(100.0).negligible(300.0), 2.0);
+        assert_eq!(Aim::BEST.negligible(300.0), 0.0);
     }
 
     /// A rest angle near zero could move by a hundredth of a radian in a step, and a fit ended before it was reached.

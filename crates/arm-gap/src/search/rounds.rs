@@ -6,6 +6,7 @@ use crate::candidates::library::Library;
 use crate::data::session::ComparisonMode;
 use crate::fitting::fit::FittedHypothesis;
 use crate::fitting::lack_of_fit::lack_of_fit;
+use crate::fitting::step::Aim;
 use crate::hypothesis::{Hypothesis, Target};
 use crate::prepared_session::PreparedSession;
 use crate::search::conclusion::Finding;
@@ -349,14 +350,15 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 .filter(|c| c.gain > c.members.iter().map(least).sum())
                 .collect();
             let before = converged.plainer.len();
-            let asking = (library, score_test);
             let (best, reserves) = contenders(&choices, library);
-            self.converge(best, state, asking, &mut converged);
+            for choice in best {
+                self.converge(choice, state, (library, score_test), &mut converged);
+            }
             for choice in reserves {
                 if !converged.tried.is_empty() {
                     break;
                 }
-                self.converge(vec![choice], state, asking, &mut converged);
+                self.converge(choice, state, (library, score_test), &mut converged);
             }
             if converged.plainer.len() == before {
                 break;
@@ -377,43 +379,45 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         })
     }
 
-    /// Converges choices by simulation, each unless it has been.
+    /// Converges a choice by simulation, unless it has been or has an effect that came to a plainer law; given up where it will not be worth
+    /// more than the best so far.
     fn converge(
         &self,
-        mut choices: Vec<Choice>,
+        choice: Choice,
         state: &SearchState<'a, N>,
         (library, score_test): (&Library, &ScoreTest),
         converged: &mut Converged<N>,
     ) {
-        choices.retain(|choice| !converged.met.contains(&choice.members));
         let question = |&m: &usize| {
             let mut candidate = library.candidates[m].clone();
             (candidate.price, candidate.spread) = (score_test.price[m], score_test.spread[m]);
             candidate
         };
+        let asked: Vec<Candidate> = choice.members.iter().map(question).collect();
+        let is_plainer = |c: &Candidate| {
+            let mut plainer = converged.plainer.iter();
+            plainer.any(|other| other.is_same_effect(&c.effect))
+        };
+        if converged.met.contains(&choice.members) || asked.iter().any(is_plainer) {
+            return;
+        }
         let SearchState { current, point, .. } = state;
-        let fitted = self.parallel(choices.len(), |i| {
-            let Choice {
-                members,
-                coefficients,
-                ..
-            } = &choices[i];
-            let asked: Vec<Candidate> = members.iter().map(question).collect();
-            let fitted = self.attempt(current, (&asked, coefficients), (point, f64::INFINITY))?;
-            Some((asked, fitted))
-        });
-        converged.met.extend(choices.into_iter().map(|c| c.members));
-        for (asked, fitted) in fitted.into_iter().flatten() {
-            let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
-            let gain = current.cost - fitted.cost;
-            let worth = gain / score_test.scale - price;
-            let simple = worth - self.price_of_shapes(&asked);
-            converged.tried.push((asked, gain));
-            if fitted.has_plainer() {
-                converged.plainer.extend(fitted.plainer());
-            } else if worth > 0.0 {
-                converged.worthy.push((simple, fitted));
-            }
+        let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
+        let shapes = self.price_of_shapes(&asked);
+        let best = converged.worthy.iter().map(|(simple, _)| *simple);
+        let best = best.fold(f64::NEG_INFINITY, f64::max);
+        let cost = current.cost - (best + price + shapes) * score_test.scale;
+        let aim = Aim::at(cost, asked.iter().any(Candidate::is_dry));
+        let fitted = self.attempt(current, (&asked, &choice.coefficients), (point, aim));
+        converged.met.push(choice.members);
+        let Some(fitted) = fitted else { return };
+        let gain = current.cost - fitted.cost;
+        let worth = gain / score_test.scale - price;
+        converged.tried.push((asked, gain));
+        if fitted.has_plainer() {
+            converged.plainer.extend(fitted.plainer());
+        } else if worth > 0.0 {
+            converged.worthy.push((worth - shapes, fitted));
         }
     }
 

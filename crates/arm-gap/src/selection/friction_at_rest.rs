@@ -6,6 +6,7 @@ use crate::GapError;
 use crate::candidates::refined_shapes::CREEP;
 use crate::data::session::ComparisonMode;
 use crate::fitting::fit::FittedHypothesis;
+use crate::fitting::step::Aim;
 use crate::hypothesis::{Hypothesis, Target};
 use crate::measurement_model::start::creeps;
 use crate::prepared_session::PreparedSession;
@@ -109,6 +110,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let asked = fitted.asked.clone();
             if fitted.leaves_much() {
                 let point = self.linearize(&hypothesis).ok()?;
+                let aim = Aim::at(aim, true);
                 return self.fit_towards(&point, (hypothesis, asked), aim).ok();
             }
             let point = self.simulate_alone(&hypothesis).ok()?;

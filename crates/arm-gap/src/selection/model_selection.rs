@@ -1,14 +1,16 @@
 //! Selection among effects: the gain of each, its alternatives, and the price of its parameters.
 
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 use arm_core::effect::{Effect, Place};
 
 use crate::GapError;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::library::{Library, LibraryEntry};
-use crate::fitting::fit::FittedHypothesis;
+use crate::fitting::fit::{FittedHypothesis, WithoutEach};
 use crate::fitting::lack_of_fit::lack_of_fit;
+use crate::fitting::step::Aim;
 use crate::hypothesis::Hypothesis;
 use crate::prepared_session::PreparedSession;
 use crate::selection::score_test::{Choice, ScoreTest};
@@ -113,11 +115,14 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let mut asked = fitted.asked.clone();
         hypothesis.named.remove(slot);
         asked.remove(slot);
-        let again =
-            |hypothesis: &Hypothesis<N>| match self.fit(point, hypothesis.clone(), asked.clone()) {
+        let aim = Aim::beside(fitted.cost);
+        let again = |hypothesis: &Hypothesis<N>| {
+            let start = (hypothesis.clone(), asked.clone());
+            match self.fit_towards(point, start, aim) {
                 Err(GapError::Simulation { .. }) => Ok(None),
                 other => other.map(Some),
-            };
+            }
+        };
         if let Some(less) = again(&hypothesis)? {
             return Ok(less);
         }
@@ -139,6 +144,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 cost: f64::INFINITY,
                 rows: fitted.rows,
                 residuals: fitted.residuals.clone(),
+                without: Arc::default(),
             },
             |(less, _)| less,
         ))
@@ -150,8 +156,22 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         fitted: &mut FittedHypothesis<N>,
         point: &LinearizationPoint<N>,
     ) -> Result<Vec<FittedHypothesis<N>>, GapError> {
-        let each = self.parallel(fitted.asked.len(), |slot| self.without(fitted, slot, point));
-        let each = each.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let known = fitted.without.get();
+        let known = known.filter(|known| known.whole == fitted.hypothesis);
+        let each = match known {
+            Some(known) => known.each.clone(),
+            None => {
+                let one = |slot| self.without(fitted, slot, point);
+                let each = self.parallel(fitted.asked.len(), one);
+                let each = each.into_iter().collect::<Result<Vec<_>, _>>()?;
+                let whole = fitted.hypothesis.clone();
+                let _ = fitted.without.set(WithoutEach {
+                    whole,
+                    each: each.clone(),
+                });
+                each
+            }
+        };
         for (candidate, less) in std::iter::zip(&mut fitted.asked, &each) {
             candidate.gained = less.cost - fitted.cost;
         }
@@ -435,8 +455,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             (asked.price, asked.spread) = (score_test.price[member], score_test.spread[member]);
             let choice = (std::slice::from_ref(&asked), choice.coefficients.as_slice());
             // A tie to spare, for fits that are slow at the end. What is clearly nearer to the data matters at any price.
-            let aim = f64::max(most + TIE + own.price - asked.price, -TIE);
-            let aim = fitted.cost + aim * scale;
+            let worse = f64::max(most + TIE + own.price - asked.price, -TIE);
+            let dry = own.is_dry() || asked.is_dry();
+            let aim = Aim::at(fitted.cost + worse * scale, dry);
             let mut again = self.attempt(from, choice, (point, aim))?;
             if own.is_of_family_in_joint(&asked.effect) {
                 again = self.fit_on(point, again, aim);
@@ -476,7 +497,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &self,
         current: &FittedHypothesis<N>,
         (asked, coefficients): (&[Candidate], &[Vec<f64>]),
-        (point, aim): (&LinearizationPoint<N>, f64),
+        (point, aim): (&LinearizationPoint<N>, Aim),
     ) -> Option<FittedHypothesis<N>> {
         /// Shares of the first-order coefficients that are tried: the response to a strong effect is smaller than to first order.
         const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];

@@ -3,6 +3,8 @@
 //! The closed chain is simulated with the base that was identified from measured motion. Its parameters stay free with every candidate,
 //! and its laws are selected last.
 
+use std::sync::Arc;
+
 use arm_core::effect::{Effect, Place};
 use arm_numerics::statistics::distributions::chi_square_tail;
 
@@ -325,7 +327,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             }
             let mut laws = self.base_laws(&settled, &terms, scale)?;
             if exchanges < EXCHANGES
-                && let Some(nearer) = self.fitted_from_nearer(&settled.0, &laws)
+                && let Some(nearer) = self.fitted_from_nearer(&settled.0, &laws, scale)
             {
                 exchanges += 1;
                 settled = nearer;
@@ -350,12 +352,13 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
     }
 
-    /// The fit once more from where another law in the place of one came clearly nearer to the data, where that is nearer with the law itself:
-    /// then not the law was wrong, but the fit had stopped short.
+    /// The fit once more from where another law in the place of one came clearly nearer to the data, where that is clearly nearer with the law
+    /// itself: then not the law was wrong, but the fit had stopped short.
     fn fitted_from_nearer(
         &self,
         fitted: &FittedHypothesis<N>,
         laws: &[BaseLaw<N>],
+        scale: f64,
     ) -> Option<Settled<'a, N>> {
         let first = self.session.effects.len();
         laws.iter().find_map(|law| {
@@ -363,7 +366,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             start.named.pop();
             start.known[first + law.base] = fitted.hypothesis.known[first + law.base];
             let again = self.settle(start, fitted.asked.clone()).ok()?;
-            (again.0.cost + again.0.enough() < fitted.cost).then_some(again)
+            (again.0.cost + TIE * scale < fitted.cost).then_some(again)
         })
     }
 
@@ -553,6 +556,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
                 cost: f64::INFINITY,
                 rows: 0,
                 residuals: Vec::new(),
+                without: Arc::default(),
             };
             (fitted, lack)
         }))
