@@ -13,12 +13,12 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     pub fn new(session: &'a Session<N>, threads: usize) -> Result<Self, GapError> {
         let noise = NoiseModel::unknown(session.channels())?;
         let mut prepared = Self::with_noise(session, noise, threads)?;
-        let mut given = prepared.linearize(&session.starting())?;
+        let mut given = prepared.simulate_alone(&session.starting())?;
         let all = prepared.fitted.clone();
         prepared.leave_out_rest(&given);
         if prepared.fitted != all {
             // A trial in which nothing is left to compare has no place among the residuals either.
-            given = prepared.linearize(&session.starting())?;
+            given = prepared.simulate_alone(&session.starting())?;
         }
         prepared.measure_noise(&given)?;
         Ok(prepared)

@@ -264,7 +264,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         &mut self,
         mut state: SearchState<'a, N>,
     ) -> Result<SearchState<'a, N>, GapError> {
-        self.measure_noise(&self.linearize(&state.current.hypothesis)?)?;
+        self.measure_noise(&self.simulate_alone(&state.current.hypothesis)?)?;
         let from;
         (state.calibrated, from) = self.settle(state.calibrated.hypothesis, Vec::new())?;
         state.before = lack_of_fit(self, &from, &state.calibrated);
@@ -301,7 +301,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// The same after the data have changed, with the noise read anew.
     pub(crate) fn calibrate_anew(&mut self) -> Result<Settled<'a, N>, GapError> {
-        let given = self.linearize(&self.given())?;
+        let given = self.simulate_alone(&self.given())?;
         self.measure_noise(&given)?;
         self.calibrate()
     }
@@ -380,7 +380,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
     }
 
     /// Converges a choice by simulation, unless it has been or has an effect that came to a plainer law; given up where it will not be worth
-    /// more than the best so far.
+    /// its price, or not more than the best so far.
     fn converge(
         &self,
         choice: Choice,
@@ -404,10 +404,11 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let SearchState { current, point, .. } = state;
         let price: f64 = asked.iter().map(|c| c.price * c.spread).sum();
         let shapes = self.price_of_shapes(&asked);
+        // Worth its price, and more than the best so far.
         let best = converged.worthy.iter().map(|(simple, _)| *simple);
-        let best = best.fold(f64::NEG_INFINITY, f64::max);
-        let cost = current.cost - (best + price + shapes) * score_test.scale;
-        let aim = Aim::at(cost, asked.iter().any(Candidate::is_dry));
+        let least = best.map(|simple| simple + price + shapes);
+        let least = least.fold(price, f64::max) * score_test.scale;
+        let aim = Aim::at(current.cost - least, asked.iter().any(Candidate::is_dry));
         let fitted = self.attempt(current, (&asked, &choice.coefficients), (point, aim));
         converged.met.push(choice.members);
         let Some(fitted) = fitted else { return };

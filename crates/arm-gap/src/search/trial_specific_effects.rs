@@ -216,7 +216,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         }
         self.take_back();
         let known: Vec<_> = found.extract_if(.., |a| a.trial.is_some()).collect();
-        self.measure_noise(&self.linearize(&state.current.hypothesis)?)?;
+        self.measure_noise(&self.simulate_alone(&state.current.hypothesis)?)?;
         let settled = self.settle(state.current.hypothesis, state.current.asked)?;
         let settled = self.disturbances(settled, found, &known)?;
         let from;
@@ -243,7 +243,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let (one, trial) = self.in_the_likelier_repeat((one, trial), &fitted);
             self.leave_out(trial, one.span());
             trial_specific.push(one);
-            self.measure_noise(&self.linearize(&point.hypothesis)?)?;
+            self.measure_noise(&self.simulate_alone(&point.hypothesis)?)?;
             (fitted, point) = self.settle(fitted.hypothesis, fitted.asked)?;
         }
         Ok((fitted, point))

@@ -47,7 +47,7 @@ impl<'a, const N: usize> Discrimination<'a, N> {
         alternatives: &[(Effect<f64>, Vec<usize>)],
     ) -> Result<Self, GapError> {
         let without = prepared.session.given();
-        let given = prepared.linearize(&without)?;
+        let given = prepared.simulate_alone(&without)?;
         let with = |effect| {
             let mut hypothesis = without.clone();
             hypothesis.named.push(effect);
@@ -138,11 +138,9 @@ fn rested<'a, const N: usize>(
     prepared: &mut PreparedSession<'a, N>,
     hypothesis: &Hypothesis<N>,
 ) -> Result<LinearizationPoint<'a, N>, GapError> {
-    let point = prepared.linearize(hypothesis)?;
-    if prepared.leave_out_rest(&point) {
-        return prepared.linearize(hypothesis);
-    }
-    Ok(point)
+    let point = prepared.simulate_alone(hypothesis)?;
+    prepared.leave_out_rest(&point);
+    prepared.linearize(hypothesis)
 }
 
 /// For every alternative what the named effect shows beyond it on the fit trials of a session, beside the responses to all that may be

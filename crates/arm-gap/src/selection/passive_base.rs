@@ -297,9 +297,9 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
 
     /// Chooses the samples and reads the noise anew from where the next calibration starts.
     fn read_anew(&mut self) -> Result<(), GapError> {
-        let point = self.linearize(&self.given())?;
+        let point = self.simulate_alone(&self.given())?;
         self.leave_out_rest(&point);
-        let point = self.linearize(&self.given())?;
+        let point = self.simulate_alone(&self.given())?;
         self.measure_noise(&point)
     }
 
@@ -539,7 +539,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         for passive in &mut hypothesis.known[session.effects.len()..] {
             passive.parameters[0] = 0.0;
         }
-        let simulated = self.linearize(&hypothesis).and_then(|point| {
+        let simulated = self.simulate_alone(&hypothesis).and_then(|point| {
             let fitted = self.state(&point, hypothesis.clone(), Vec::new())?;
             let lack = lack_of_fit(self, &point, &fitted);
             Ok((fitted, lack))

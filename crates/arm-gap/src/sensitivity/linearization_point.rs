@@ -72,7 +72,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         self.linearized_for(hypothesis, self.nuisances())
     }
 
-    /// The same without rows of the nuisances, which the cost of the hypothesis itself does not need.
+    /// The same without rows of the nuisances, which the cost of the hypothesis itself, the noise and the samples at rest do not need.
     ///
     /// # Errors
     /// As [`PreparedSession::linearize`].
