@@ -49,7 +49,7 @@ impl Candidate {
     }
 
     /// Whether it is about dry friction.
-    pub fn is_dry(&self) -> bool {
+    pub fn is_dry_friction(&self) -> bool {
         self.kind().smoothed_by().is_some()
     }
 

@@ -408,7 +408,10 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
         let best = converged.worthy.iter().map(|(simple, _)| *simple);
         let least = best.map(|simple| simple + price + shapes);
         let least = least.fold(price, f64::max) * score_test.scale;
-        let aim = Aim::at(current.cost - least, asked.iter().any(Candidate::is_dry));
+        let aim = Aim::at(
+            current.cost - least,
+            asked.iter().any(Candidate::is_dry_friction),
+        );
         let fitted = self.attempt(current, (&asked, &choice.coefficients), (point, aim));
         converged.met.push(choice.members);
         let Some(fitted) = fitted else { return };

@@ -456,7 +456,7 @@ impl<'a, const N: usize> PreparedSession<'a, N> {
             let choice = (std::slice::from_ref(&asked), choice.coefficients.as_slice());
             // A tie to spare, for fits that are slow at the end. What is clearly nearer to the data matters at any price.
             let worse = f64::max(most + TIE + own.price - asked.price, -TIE);
-            let dry = own.is_dry() || asked.is_dry();
+            let dry = own.is_dry_friction() || asked.is_dry_friction();
             let aim = Aim::at(fitted.cost + worse * scale, dry);
             let mut again = self.attempt(from, choice, (point, aim))?;
             if own.is_of_family_in_joint(&asked.effect) {
